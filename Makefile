@@ -1,0 +1,89 @@
+# make setup | demo | test | lint | bench | pins | clean
+# Needs Python 3.10 to 3.13, git and make. PYTHON=python3.12 chooses the Python of .venv.
+
+# A ROS that is sourced, or another venv with ROS, must not leak into ours.
+unexport PYTHONPATH LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+.DELETE_ON_ERROR:
+.PHONY: setup demo test test-oldest lint bench pins clean FORCE
+
+venv := .venv
+oldest := .venv-oldest
+python := $(venv)/bin/python
+numerical := -m pytest -n 2 -m "not ros"
+
+pythons := python3 python3.13 python3.12 python3.11 python3.10
+# Those for which scipy 1.11.4 has wheels; ROS 2 Jazzy itself has 3.12.
+oldest_pythons := python3.12 python3.11 python3.10 python3
+find_oldest := sh tools/find_python.sh 12 $(oldest_pythons)
+
+metadata := package.xml setup.py setup.cfg pyproject.toml
+sources := $(shell find frac_accel config launch resource scripts -type f ! -name '*.pyc')
+
+setup: install/.done
+
+demo: setup
+	$(python) -m frac_accel.demo --output-dir demo_output
+
+# BLAS threads would only fight with the other worker.
+test test-oldest: export OPENBLAS_NUM_THREADS := 1
+
+test: setup lint
+	$(python) $(numerical)
+	$(python) -m pytest -m ros
+	@if $(find_oldest) >/dev/null; then $(MAKE) --no-print-directory test-oldest; else \
+	    echo "so the numerical suite was not run with numpy 1.26.4 and scipy 1.11.4"; fi
+
+test-oldest: $(oldest)/.done
+	@$(oldest)/bin/python -c 'import numpy, platform, scipy; print("once more with Python", \
+	    platform.python_version(), "numpy", numpy.__version__, "scipy", scipy.__version__)'
+	$(oldest)/bin/python $(numerical)
+
+lint: $(venv)/.done
+	$(python) -m ruff check .
+
+bench: setup
+	for script in benchmarks/*.py; do $(python) $$script || exit; done
+
+pins:
+	for minor in 10 11 12 13; do \
+	    pythons="$$pythons $$(sh tools/find_python.sh $$minor python3.$$minor)" || exit; done; \
+	set -- $$pythons; \
+	$$1 tools/pin_requirements.py requirements/venv.in $$1 $$2 $$3 $$4 && \
+	$$1 tools/pin_requirements.py requirements/oldest.in $$1 $$2 $$3
+
+clean:
+	rm -rf $(venv) $(oldest) build install log demo_output *.egg-info .pytest_cache .ruff_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +
+
+# A venv is made anew when its pins change, so that an interrupted or outdated one is never used;
+# .venv also when the folder has moved or the Python is another.
+made_for := $(CURDIR) $(shell $(or $(PYTHON),$(python)) -V 2>/dev/null)
+ifneq ($(shell cat $(venv)/.done 2>/dev/null),$(made_for))
+$(venv)/.done: FORCE
+endif
+# empy comes as source only: setuptools first, then no build isolation, which would fetch another.
+$(venv)/.done: requirements/venv.txt
+	found=$$(sh tools/find_python.sh 13 $(or $(PYTHON),$(pythons))) && \
+	    rm -rf $(venv) && "$$found" -m venv $(venv)
+	$(python) -m pip install -q $$(grep '^setuptools==' $<)
+	$(python) -m pip install -q --no-deps --no-build-isolation --use-pep517 -r $<
+	for shell in sh bash; do cp tools/wheels_setup.sh $(venv)/local_setup.$$shell || exit; done
+	echo "$(CURDIR) $$($(python) -V)" > $@
+
+$(oldest)/.done: requirements/oldest.txt
+	found=$$($(find_oldest)) && rm -rf $(oldest) && "$$found" -m venv $(oldest)
+	$(oldest)/bin/python -m pip install -q --no-deps -r $<
+	touch $@
+
+$(venv)/.frac_accel: $(venv)/.done $(metadata)
+	$(python) -m pip install -q --no-deps --no-build-isolation --editable .
+	touch $@
+
+install/.done: $(venv)/.frac_accel $(sources)
+	rm -rf build install
+	AMENT_PREFIX_PATH=$(CURDIR)/$(venv) $(venv)/bin/colcon --log-base build/log build \
+	    > build.log 2>&1 || { cat build.log; exit 1; }
+	mv build.log build/
+	touch $@

@@ -1,0 +1,58 @@
+"""Resolve ``requirements/NAME.in`` for several Pythons into one pinned ``requirements/NAME.txt``.
+
+usage: python tools/pin_requirements.py requirements/venv.in PYTHON [PYTHON ...]
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+
+def resolve(python, requirements):
+    """Return ``{package: version}`` that pip of a fresh venv of `python` would install."""
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([python, "-m", "venv", folder], check=True)
+        report = Path(folder) / "report.json"
+        subprocess.run(
+            [f"{folder}/bin/python", "-m", "pip", "install", "--quiet", "--dry-run",
+             "--ignore-installed", "--report", report, "-r", requirements],
+            check=True)
+        packages = json.loads(report.read_text())["install"]
+    return {p["metadata"]["name"]: p["metadata"]["version"] for p in packages}
+
+
+def python_version(python):
+    """Return `python`'s version as ``(major, minor)``."""
+    command = [python, "-c", "import sys; print(*sys.version_info[:2])"]
+    return tuple(map(int, subprocess.check_output(command, text=True).split()))
+
+
+def pins(resolved):
+    """Yield requirement lines from ``{(major, minor): {package: version}}``."""
+    pythons = sorted(resolved)
+    names = sorted({name for versions in resolved.values() for name in versions}, key=str.lower)
+    for name in names:
+        by_version = {}
+        for python in pythons:
+            if name in resolved[python]:
+                by_version.setdefault(resolved[python][name], []).append(python)
+        for version, having in by_version.items():
+            bounds = []
+            if having[0] != pythons[0]:
+                bounds.append('python_version >= "{}.{}"'.format(*having[0]))
+            if having[-1] != pythons[-1]:
+                bounds.append('python_version <= "{}.{}"'.format(*having[-1]))
+            yield f"{name}=={version}" + (" ; " + " and ".join(bounds) if bounds else "")
+
+
+def main():
+    source = Path(sys.argv[1])
+    resolved = {python_version(python): resolve(python, source) for python in sys.argv[2:]}
+    lines = [f"# Made from {source.name} by `make pins`.", *pins(resolved)]
+    source.with_suffix(".txt").write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()
