@@ -1,0 +1,30 @@
+"""Identify, simulate, correct and diagnose accelerometers."""
+
+import importlib
+
+# Names load what they need when they are first used: a node must not wait for the commands'
+# libraries, nor a notebook for those of the bags.
+_HOME = {
+    "SensorModel": "model",
+    "simulate": "simulation",
+    "identify": "identification",
+    "design_inverse": "correction.design",
+    "Corrector": "correction.corrector",
+    "LiveSimulator": "live_simulation",
+    "error_metrics": "metrics",
+    "read_bag": "bag",
+    "write_bag": "bag",
+    "FracAccelError": "errors",
+}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name):
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+
+
+def __dir__():
+    return __all__

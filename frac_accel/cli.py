@@ -1,0 +1,73 @@
+"""The command ``frac_accel``: one verb per file of `frac_accel.commands`."""
+
+import argparse
+import importlib
+import sys
+
+from .errors import FracAccelError
+
+# Order of the help: the way through the work.
+VERBS = {
+    "simulate": "reference -> what a sensor would say",
+    "identify": "measured pair -> sensor model with standard uncertainties",
+    "validate": "error metrics of a model and of its correction",
+    "correct": "raw acceleration -> corrected acceleration",
+}
+
+
+def main(arguments=None):
+    """Run one verb.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Default: those of the process.
+
+    Returns
+    -------
+    int
+        Exit status: 0 done, whatever the verdict; 2 bad input, with one line that says what.
+    """
+    arguments = sys.argv[1:] if arguments is None else arguments
+    parser = argparse.ArgumentParser(
+        prog="frac_accel", description="Simulate, identify, validate and correct accelerometers.",
+        epilog="frac_accel VERB --help tells more of each.")
+    verbs = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
+    try:
+        modules = _add_verbs(verbs, arguments)
+    except ModuleNotFoundError as error:
+        print(f"frac_accel: the Python library {error.name} is missing; install it with "
+              f"pip install {error.name}", file=sys.stderr)
+        return 2
+    chosen = parser.parse_args(arguments)
+    try:
+        modules[chosen.verb].run(chosen)
+    except FracAccelError as error:
+        print(f"frac_accel {chosen.verb}: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        # whoever read the output has seen enough
+        sys.stdout = None
+        return 0
+    except KeyboardInterrupt:
+        print(f"frac_accel {chosen.verb}: interrupted", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _add_verbs(verbs, arguments):
+    """Modules of the verbs that are asked for."""
+    modules = {}
+    for verb, summary in VERBS.items():
+        sub = verbs.add_parser(verb, help=summary)
+        # a verb's libraries are loaded only if it, or its help, is asked for
+        if verb in arguments:
+            modules[verb] = importlib.import_module(f".commands.{verb}", __package__)
+            sub.description = modules[verb].__doc__
+            sub.formatter_class = argparse.RawDescriptionHelpFormatter
+            modules[verb].add_arguments(sub)
+    return modules
+
+
+if __name__ == "__main__":
+    sys.exit(main())

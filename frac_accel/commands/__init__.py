@@ -1,0 +1,1 @@
+"""Verbs of the command ``frac_accel``: thin shells over the package."""

@@ -1,0 +1,132 @@
+"""What the verbs share: options, results as files, progress."""
+
+import argparse
+import hashlib
+import json
+import math
+import sys
+from pathlib import Path
+
+from tqdm import tqdm
+
+from ..bag import RAW_TOPIC, REFERENCE_TOPIC, BagReader
+from ..errors import BagError, FracAccelError
+from ..parameters import plain
+
+
+def add_bag(parser):
+    """The bag that a verb reads."""
+    parser.add_argument("bag", metavar="BAG", help="bare .mcap file or rosbag2 folder")
+
+
+def add_model(parser):
+    """The model that a verb uses."""
+    parser.add_argument("--model", required=True, metavar="M.yaml", help="sensor model")
+
+
+def add_topics(parser, axis=True):
+    """Which topics and which axis of the bag hold the pair."""
+    parser.add_argument("--reference", default=REFERENCE_TOPIC, metavar="TOPIC",
+                        help="topic of the reference (default: %(default)s)")
+    parser.add_argument("--sensor", default=RAW_TOPIC, metavar="TOPIC",
+                        help="topic of the sensor (default: %(default)s)")
+    if axis:
+        parser.add_argument("--axis", default="x", choices=list("xyz"),
+                            help="axis that is judged (default: %(default)s)")
+
+
+def add_filter(parser):
+    """Wishes for the inverse filter."""
+    parser.add_argument("--sample-rate", type=positive, metavar="HZ",
+                        help="sampling rate (default: estimated from the stamps)")
+    parser.add_argument("--bandwidth", type=positive, metavar="HZ",
+                        help="highest frequency to correct (default: the model's band, or where "
+                             "the sensor has lost 90 %% of its gain)")
+    parser.add_argument("--lowest", type=positive, metavar="HZ",
+                        help="lowest frequency to correct (default: 0, or where a high-pass has "
+                             "lost 90 %% of its gain)")
+    parser.add_argument("--max-delay", type=positive, metavar="S",
+                        help="permitted delay of the filter (default: at most four periods of the "
+                             "highest frequency)")
+
+
+def filter_wishes(arguments):
+    """Those wishes as keywords of `Corrector`."""
+    return {"sample_rate_hz": arguments.sample_rate or 0.0, "bandwidth_hz": arguments.bandwidth,
+            "lowest_hz": arguments.lowest, "max_delay_s": arguments.max_delay}
+
+
+def add_json(parser):
+    """Machine-readable result."""
+    parser.add_argument("--json", metavar="FILE", help="also write the result as JSON")
+
+
+def positive(text):
+    """Type of an option: a finite number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} given, expected a number above 0")
+    return value
+
+
+def write_json(path, result):
+    """Write a result; numbers that are none (NaN) become null, as JSON knows no other way."""
+    if path is None:
+        return
+    text = json.dumps(_without_nan(plain(result)), indent=1, allow_nan=False)
+    try:
+        Path(path).write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise FracAccelError(f"{path}: cannot write the result: {error.strerror}") from None
+
+
+def open_bag(path):
+    """BagReader whose damage is told at once."""
+    reader = BagReader(path)
+    for warning in reader.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    return reader
+
+
+def require_output(path, *inputs):
+    """Refuse an output that is one of the inputs, or that has no folder."""
+    path = Path(path)
+    for source in inputs:
+        if path.exists() and path.resolve() == Path(source).resolve():
+            raise BagError(f"{path}: is the input, expected another file for the output")
+    if not path.absolute().parent.is_dir():
+        raise BagError(f"{path}: the folder {path.absolute().parent} does not exist")
+
+
+def progress(total, unit="msg"):
+    """Bar on standard error that shows after two seconds."""
+    return tqdm(total=total, unit=unit, delay=2, leave=False, file=sys.stderr, unit_scale=True)
+
+
+def provenance(bag, command):
+    """Where a result comes from: the bag, its content's hash, the command and our version."""
+    from importlib.metadata import PackageNotFoundError, version
+    path = Path(bag)
+    files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+    digest = hashlib.sha256()
+    for file in files:
+        with open(file, "rb") as stream:
+            while part := stream.read(1 << 20):
+                digest.update(part)
+    try:
+        ours = version("frac_accel")
+    except PackageNotFoundError:
+        ours = "not installed"
+    return {"bag": path.name, "sha256": digest.hexdigest(), "command": command,
+            "frac_accel_version": ours}
+
+
+def _without_nan(value):
+    if isinstance(value, dict):
+        return {str(key): _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,142 @@
+"""Correct raw acceleration with a sensor model; the same kernel as the corrector node.
+
+The output bag holds the corrected samples on /imu/data, and the raw and reference topics as they
+are. Samples that cannot be corrected (the filter's warm-up, bad stamps or values) are counted.
+"""
+
+import collections
+
+import numpy as np
+
+from ..bag import CORRECTED_TOPIC, BagWriter, cdr
+from ..correction import Corrector
+from ..errors import BagError
+from ..model import SensorModel
+from ._common import (
+    add_bag,
+    add_filter,
+    add_json,
+    add_model,
+    add_topics,
+    filter_wishes,
+    open_bag,
+    progress,
+    require_output,
+    write_json,
+)
+
+
+def add_arguments(parser):
+    """Options of the verb."""
+    add_bag(parser)
+    add_model(parser)
+    parser.add_argument("-o", "--output", required=True, metavar="OUT.mcap", help="bag to write")
+    add_topics(parser, axis=False)
+    parser.add_argument("--corrected", default=CORRECTED_TOPIC, metavar="TOPIC",
+                        help="topic of the corrected samples (default: %(default)s)")
+    add_filter(parser)
+    add_json(parser)
+
+
+def run(arguments):
+    """Do it."""
+    require_output(arguments.output, arguments.bag)
+    corrector = Corrector(SensorModel.load(arguments.model), **filter_wishes(arguments))
+    reader = open_bag(arguments.bag)
+    raw = reader.topic(arguments.sensor, cdr.ACCELERATION_TYPES)
+    if not raw.count:
+        raise BagError(f"{arguments.bag}: topic {arguments.sensor} has no messages")
+    copied = [raw.name] + [arguments.reference] * (arguments.reference in reader.topics)
+    with BagWriter(arguments.output) as writer, \
+            progress(sum(reader.topics[name].count for name in copied)) as bar:
+        for name in copied:
+            writer.copy_topic(reader.topics[name])
+        writer.copy_topic(raw, arguments.corrected)
+        sink = _Sink(corrector, writer, raw.type_name, arguments.corrected)
+        for block in reader.blocks(copied):
+            times = list(zip(block.log_times_ns.tolist(), block.publish_times_ns.tolist()))
+            for data, (log, publish) in zip(block.messages, times):
+                writer.write(block.topic.name, data, log, publish)
+            if block.topic.name == raw.name:
+                sink.add(block)
+            bar.update(len(times))
+        sink.finish()
+        counters = corrector.counters
+        if not counters["given"]:
+            raise BagError(f"{arguments.bag}: topic {arguments.sensor}: nothing could be corrected "
+                           f"of {counters['samples']} samples: {fates(counters)}")
+    for warning in reader.warnings:
+        print(f"warning: {warning}")
+    summary = corrector.design.summary()
+    print(f"{arguments.output}: {counters['given']} of {counters['samples']} samples corrected at "
+          f"{summary['sampling_rate_hz']:.6g} Hz" + (f"; {fates(counters)}" if fates(counters) else
+                                                     ""))
+    for axis, design in summary["axes"].items():
+        low, high = design["band_hz"]
+        print(f"  {axis}: {low:.4g} to {high:.4g} Hz, worst error "
+              f"{design['worst_amplitude_error']:.2%} and {design['worst_phase_error_deg']:.3f} "
+              f"deg, noise gain {design['noise_gain']:.3g}")
+    print(f"  filter delay {summary['filter_delay_s']:.4g} s; sensor's own delay "
+          f"{summary['sensor_delay_s']:.4g} s, taken out of the stamps")
+    write_json(arguments.json, {"output": str(arguments.output), "counters": counters,
+                                "filters": summary, "warnings": reader.warnings})
+
+
+def fates(counters):
+    """What happened to samples that were not simply corrected, in words."""
+    words = {"warm_up": "before the filter was full", "waiting": "after the last full filter",
+             "cut_off": "before a long gap", "duplicates": "with a repeated stamp",
+             "stamps_back": "with a stamp that goes back", "early": "too many by their stamps",
+             "not_finite": "not finite", "filled": "missing and bridged"}
+    return ", ".join(f"{counters[name]} {text}" for name, text in words.items()
+                     if counters.get(name))
+
+
+class _Sink:
+    """Runs raw blocks through the corrector and writes what becomes ready."""
+
+    def __init__(self, corrector, writer, type_name, topic):
+        self._corrector, self._writer = corrector, writer
+        self._type, self._topic = type_name, topic
+        self._waiting = collections.deque()
+        self._first = 0
+        self._frame = ""
+
+    def add(self, block):
+        if self._type == cdr.POINT_CLOUD2:
+            for data, log in zip(block.messages, block.log_times_ns.tolist()):
+                samples = cdr.read_point_cloud(data)
+                self._frame, self._log = samples.frame_id, log
+                self._write_cloud(self._corrector.process(samples.stamps_ns, samples.values))
+            return
+        samples = block.samples()
+        self._waiting.extend(zip(block.messages, block.log_times_ns.tolist()))
+        self._write(self._corrector.process(samples.stamps_ns, samples.values, samples.variance))
+
+    def finish(self):
+        rest = self._corrector.finish()
+        (self._write_cloud if self._type == cdr.POINT_CLOUD2 else self._write)(rest)
+
+    def _write(self, ready):
+        if not len(ready):
+            return
+        # a sample that was never given out is dropped when a later one is
+        messages, logs = [], []
+        for index in ready.index.tolist():
+            while self._first < index:
+                self._waiting.popleft()
+                self._first += 1
+            message, log = self._waiting.popleft()
+            self._first += 1
+            messages.append(message)
+            logs.append(log)
+        patched = cdr.patch_samples(self._type, messages, ready.stamps_ns, ready.values,
+                                    ready.variance)
+        for message, log in zip(patched, logs):
+            self._writer.write(self._topic, message, log)
+
+    def _write_cloud(self, ready):
+        if len(ready):
+            block = cdr.Samples.of(ready.stamps_ns, ready.values, np.full(ready.values.shape,
+                                                                          np.nan), self._frame)
+            self._writer.write(self._topic, cdr.encode_point_cloud(block), self._log)

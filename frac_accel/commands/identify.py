@@ -1,0 +1,37 @@
+"""Identify a sensor model from a measured pair, with standard uncertainties."""
+
+from ..identification import identify
+from ..pair import load_pair
+from ._common import add_bag, add_json, add_topics, provenance, require_output, write_json
+
+
+def add_arguments(parser):
+    """Options of the verb."""
+    add_bag(parser)
+    parser.add_argument("--structure", choices=["oscillator"], default="oscillator",
+                        help="form of the model (default: %(default)s)")
+    parser.add_argument("-o", "--output", required=True, metavar="M.yaml", help="model to write")
+    add_topics(parser)
+    add_json(parser)
+
+
+def run(arguments):
+    """Do it."""
+    require_output(arguments.output, arguments.bag)
+    pair = load_pair(arguments.bag, arguments.reference, arguments.sensor, arguments.axis)
+    command = (f"frac_accel identify {arguments.bag} --structure {arguments.structure} --reference "
+               f"{arguments.reference} --sensor {arguments.sensor} --axis {arguments.axis}")
+    result = identify(pair, arguments.axis, arguments.structure,
+                      provenance(arguments.bag, command))
+    result.model.save(arguments.output)
+    low, high = result.model.band_hz
+    print(f"{len(pair)} samples at {pair.sampling_rate_hz:.6g} Hz, excited from {low:.4g} to "
+          f"{high:.4g} Hz")
+    for name, entry in result.parameters.items():
+        print(f"  {name:21} {entry['value']:12.6g} +- {entry['std']:.2g} {entry['unit']}")
+    print(f"  residual {result.nrmse:.3%} of the output, {result.held_out_nrmse:.3%} on held-out "
+          "data")
+    for note in result.notes:
+        print(f"note: {note}")
+    print(f"{arguments.output}: written")
+    write_json(arguments.json, result.as_dict())

@@ -1,0 +1,522 @@
+"""Design of the filter that inverts a sensor's composite linear response (or plays it live)."""
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from ..core import Arx
+from ..errors import DesignError, FracAccelError
+from ..model import AXES
+from .filter import ParallelFilter
+
+# A band ends where the sensor's gain has fallen to this share of its reference gain: the inverse
+# multiplies the noise there by ten. At the latest it ends at 0.6 of the Nyquist frequency.
+GAIN_AT_BAND_EDGE = 0.1
+NYQUIST_SHARE = 0.6
+# Worst relative error of the complex response in the band, where the user names none.
+TOLERANCE = 2e-3
+# Without a permitted delay: the shortest whose noise gain is this close to that of a brick wall.
+NOISE_EXCESS = 1.3
+# Lowest frequency [of the sampling rate] down to which fractional memory is modelled.
+LOWEST_SHARE = 1e-6
+# Below the band of a sensor with a high-pass: gain, as a multiple of that at the band's edge, at
+# which the rise weighs as much as the permitted error does in the band.
+MOST_RISE = 30
+# Taps after the delay, in periods of the highest frequency: with them a filter of short delay is as
+# accurate as one of long delay, and far less noisy than with as many taps after as before.
+TAIL = 4
+# Delay, in periods of the highest frequency or of its distance from the Nyquist frequency, beyond
+# which a filter gains nothing.
+_LONGEST = 8
+_MOST_TAPS = 4096
+
+
+@dataclasses.dataclass(frozen=True)
+class DesignedFilter:
+    """A filter for one axis with what it is worth.
+
+    Attributes
+    ----------
+    filter : ParallelFilter
+    sampling_rate_hz : float
+    band_hz : tuple of float
+        Lowest and highest frequency [Hz] for which the errors hold.
+    delay_s : float
+        Delay of the filter alone [s].
+    amplitude_error : float
+        Worst relative amplitude error in the band.
+    phase_error_deg : float
+        Worst phase error in the band [degree], its delay taken out.
+    noise_gain : float
+        Standard deviation of the output per standard deviation of white input noise.
+    """
+
+    filter: ParallelFilter
+    sampling_rate_hz: float
+    band_hz: tuple
+    delay_s: float
+    amplitude_error: float
+    phase_error_deg: float
+    noise_gain: float
+
+
+@dataclasses.dataclass(frozen=True)
+class FilterDesign:
+    """Filters for the three axes of a sensor model at one sampling rate.
+
+    Attributes
+    ----------
+    model : SensorModel
+    sampling_rate_hz : float
+    axes : tuple of DesignedFilter
+        One for each of x, y, z.
+    delay_samples : int
+        An output belongs to the sample this many before the newest.
+    sensor_delay_ns : int
+        Sensor's own delay [ns], which the correction takes out of the stamp.
+    """
+
+    model: object
+    sampling_rate_hz: float
+    axes: tuple
+    delay_samples: int
+    sensor_delay_ns: int
+
+    @property
+    def warm_up_samples(self):
+        """Number of samples after a start that cannot be estimated: the taps are not yet full."""
+        return max(axis.filter.lead + len(axis.filter.taps) for axis in self.axes) - 1
+
+    def summary(self):
+        """Plain numbers of the design, for reports and diagnostics."""
+        return {
+            "sampling_rate_hz": self.sampling_rate_hz,
+            "filter_delay_s": self.delay_samples / self.sampling_rate_hz,
+            "sensor_delay_s": self.sensor_delay_ns * 1e-9,
+            "warm_up_s": self.warm_up_samples / self.sampling_rate_hz,
+            "axes": {name: {
+                "band_hz": list(axis.band_hz),
+                "worst_amplitude_error": axis.amplitude_error,
+                "worst_phase_error_deg": axis.phase_error_deg,
+                "noise_gain": axis.noise_gain,
+                "static_gain": axis.filter.static_gain,
+                "taps": len(axis.filter.taps), "poles": len(axis.filter.poles),
+            } for name, axis in zip(AXES, self.axes)},
+        }
+
+
+def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None, lowest_hz=None,
+                   tolerance=TOLERANCE):
+    r"""Stable causal inverse of a sensor model.
+
+    The composite response of each axis (core, mounting, conditioner, gain) is inverted as one
+    filter: with the target :math:`T(f) = e^{-j 2\pi f d} / H(f)` its coefficients minimise
+
+    .. math:: \sum_{band} \left|G(f)/T(f) - 1\right|^2 + \mu^2 \int_{rest} |G(f)|^2 df
+
+    with the largest noise weight :math:`\mu` for which the worst error in the band, checked on a
+    denser grid, stays within the tolerance. The poles of `G` are fixed beforehand, so the problem
+    is linear and the result stable; compare the least-squares inverse of S. Eichstädt et al.,
+    *Metrologia* 47 (2010) 522-533, which has no poles and a separate low-pass.
+
+    Parameters
+    ----------
+    model : SensorModel
+    sampling_rate_hz : float
+        Rate of the record [Hz].
+    bandwidth_hz : float, optional
+        Highest frequency to correct [Hz]. Default: where the sensor's gain has fallen to a tenth,
+        at most 0.6 of the Nyquist frequency.
+    max_delay_s : float, optional
+        Permitted delay of the filter [s]. Default: the shortest whose noise gain is within 30 % of
+        that of an ideal band limit, at most four periods of the highest frequency unless the
+        tolerance needs more.
+    lowest_hz : float, optional
+        Lowest frequency to correct [Hz]. Default: 0, or where a high-pass leaves a tenth.
+    tolerance : float
+        Permitted worst relative error of the complex response in the band.
+
+    Returns
+    -------
+    FilterDesign
+
+    Raises
+    ------
+    DesignError
+        If it cannot be met; the message says what can.
+    """
+    rate = _positive(sampling_rate_hz, "sampling_rate_hz")
+    for name, value in (("bandwidth_hz", bandwidth_hz), ("max_delay_s", max_delay_s),
+                        ("lowest_hz", lowest_hz), ("tolerance", tolerance)):
+        if value is not None:
+            _positive(value, name)
+    bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz)
+             for name, axis in zip(AXES, model.axes)]
+    # stamps are whole nanoseconds; what is left of the delay is done by the filters
+    sensor_delay_ns = int(np.ceil(max(axis.delay_s for axis in model.axes) * 1e9 - 1e-3))
+
+    @functools.cache
+    def problem(axis, band):
+        return _Problem(lambda s: 1 / axis.transfer_function(s), axis.zeros(), rate, band,
+                        max(0.0, sensor_delay_ns * 1e-9 - axis.delay_s) * rate)
+
+    problems = [problem(axis, band) for axis, band in zip(model.axes, bands)]
+    delay = _choose_delay(list(dict.fromkeys(problems)), rate, max_delay_s, tolerance)
+    return FilterDesign(
+        model=model, sampling_rate_hz=rate,
+        axes=tuple(p.solve(delay, tolerance) for p in problems),
+        delay_samples=delay, sensor_delay_ns=sensor_delay_ns)
+
+
+def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
+    """Filters that play a sensor model's linear response live, one per axis.
+
+    Parameters
+    ----------
+    model : SensorModel
+    sampling_rate_hz : float
+    tolerance : float
+        Permitted worst relative error up to 0.6 of the Nyquist frequency.
+
+    Returns
+    -------
+    FilterDesign
+        The sensor's own delay is in the filters, so ``sensor_delay_ns`` is 0.
+
+    Raises
+    ------
+    DesignError
+        If the tolerance cannot be met.
+    """
+    rate = _positive(sampling_rate_hz, "sampling_rate_hz")
+    # a sensor whose stamps are early (a negative delay) can only be played so much later
+    wait = int(np.ceil(max(0.0, *(-axis.delay_s * rate for axis in model.axes))))
+
+    @functools.cache
+    def problem(axis):
+        return _Problem(axis.transfer_function, axis.poles(), rate,
+                        (0.0, NYQUIST_SHARE * rate / 2), axis.delay_s * rate + wait)
+
+    problems = [problem(axis) for axis in model.axes]
+    delay = _choose_delay(list(dict.fromkeys(problems)), rate, None, tolerance)
+    return FilterDesign(model=model, sampling_rate_hz=rate,
+                        axes=tuple(p.solve(delay, tolerance) for p in problems),
+                        delay_samples=delay + wait, sensor_delay_ns=0)
+
+
+class _Problem:
+    """Least-squares fit of a filter with given poles to a target response.
+
+    Parameters
+    ----------
+    target : callable
+        Wanted response at complex s, without delay.
+    slow_or_resonant : ndarray
+        Poles [rad/s] of the target, which the filter takes over where they are stable.
+    rate, band : float, tuple
+    extra_delay : float
+        Delay [samples] that this axis's target has beyond the common one.
+    """
+
+    def __init__(self, target, poles_s, rate, band, extra_delay):
+        self.rate, self.band = rate, band
+        self.lead = int(extra_delay)
+        self.extra_delay = extra_delay - self.lead
+        low, high = band
+        self.poles_s = poles_s
+        self.grid = _band_grid(band, rate, poles_s)
+        self.check = _refined(self.grid)
+        self.target = _evaluate(target, self.grid, rate)
+        self.check_target = _evaluate(target, self.check, rate)
+        edge = min(6 * high, rate / 2)
+        above = np.unique(np.r_[np.linspace(high, edge, 200), np.linspace(edge, rate / 2, 150)])
+        below = np.linspace(0, low, 60) if low else np.empty(0)
+        self.outside = np.r_[below, above]
+        spacing = np.r_[np.gradient(below) if low else below, np.gradient(above)]
+        # root mean square over all frequencies: with it the noise gain is a fraction of this
+        self.scale = np.sqrt(np.mean(np.abs(self.target)**2))
+        self.outside_weight = np.sqrt(spacing / (rate / 2)) / self.scale
+        self.longest = min(_MOST_TAPS // 2, int(np.ceil(_LONGEST * rate / min(high, rate / 2 - high))))
+        linear = np.linspace(low, high, 2000)
+        gain = np.abs(_evaluate(target, linear, rate))
+        self.ideal_noise_gain = np.sqrt(np.mean(gain**2) * (high - low) / (rate / 2))
+        self._solved = {}
+
+    def solve(self, delay, tolerance):
+        """Least noisy DesignedFilter within `tolerance`; with the smallest error if none is."""
+        # another axis may need more delay than this one can use
+        wait = max(0, delay - self.longest)
+        case = delay - wait, tolerance
+        if case not in self._solved:
+            self._solved[case] = self._solve(*case)
+        design = self._solved[case]
+        return dataclasses.replace(
+            design, delay_s=design.delay_s + wait / self.rate,
+            filter=dataclasses.replace(design.filter, lead=design.filter.lead + wait))
+
+    def _solve(self, delay, tolerance):
+        taps, poles = self._structure(delay)
+        low = self.band[0]
+        shift = delay + self.extra_delay
+        inside = self._columns(self.grid, taps, poles)
+        inside *= (np.exp(2j * np.pi * self.grid * shift / self.rate) / self.target)[:, None]
+        # the fit is worst where a high-pass's band begins: there an error weighs more
+        weight = np.sqrt((1 + 4 * (low / np.maximum(self.grid, 1e-300))**2) / len(self.grid))
+        inside *= weight[:, None]
+        outside = self._columns(self.outside, taps, poles) * self.outside_weight[:, None]
+        wanted = weight
+        if low:
+            # below a high-pass's band the inverse may rise, but not without end
+            below = np.linspace(0, low, 20)
+            rise = MOST_RISE * np.abs(self.target[0]) / tolerance
+            inside = np.r_[inside, self._columns(below, taps, poles) / (rise * np.sqrt(len(below)))]
+            wanted = np.r_[wanted, np.zeros(len(below))]
+        # orthogonal reduction once; each noise weight then solves a small system
+        basis, triangle = np.linalg.qr(_real(inside))
+        right = basis.T @ np.r_[wanted, np.zeros(len(wanted))]
+        noise = np.linalg.qr(_real(outside), mode="r")
+        check = self._columns(self.check, taps, poles)
+        check *= (np.exp(2j * np.pi * self.check * shift / self.rate) / self.check_target)[:, None]
+
+        def fit(noise_weight):
+            matrix = np.r_[triangle, noise_weight * noise]
+            scale = np.linalg.norm(matrix, axis=0)
+            unknowns = np.linalg.lstsq(matrix / scale, np.r_[right, np.zeros(len(noise))],
+                                       rcond=1e-13)[0] / scale
+            return unknowns, check @ unknowns
+
+        quiet, loud = -5.0, 2.0
+        best, response = fit(10.0**quiet)
+        if np.max(np.abs(response - 1)) <= tolerance:
+            while loud - quiet > 0.1:
+                middle = (quiet + loud) / 2
+                unknowns, trial = fit(10.0**middle)
+                if np.max(np.abs(trial - 1)) <= tolerance:
+                    quiet, best, response = middle, unknowns, trial
+                else:
+                    loud = middle
+        result = self._filter(best, taps, poles)
+        return DesignedFilter(
+            filter=result, sampling_rate_hz=self.rate, band_hz=self.band,
+            delay_s=(shift + self.lead) / self.rate,
+            amplitude_error=float(np.max(np.abs(np.abs(response) - 1))),
+            phase_error_deg=float(np.degrees(np.max(np.abs(np.angle(response))))),
+            noise_gain=result.noise_gain)
+
+    def _structure(self, delay):
+        """Basis of the taps, and the poles in z."""
+        low, high = self.band
+        before = np.ceil(delay + self.extra_delay)
+        count = int(before + max(before, np.ceil(TAIL * self.rate / high))) + 2
+        step = max(1, int(self.rate / (8 * high)))
+        taps = _SmoothTaps.of_length(max(count, 4), step)
+        # decays that the taps alone would cut off too early
+        memory = min(5 * self.rate / (np.pi * taps.length), 0.15 * self.rate)
+        poles_s = [p for p in self.poles_s if p.real < 0 and abs(p) < 0.4 * 2 * np.pi * self.rate
+                   and (p.imag or abs(p) > 2 * np.pi * memory / 10)]
+        lowest = low / 20 if low else LOWEST_SHARE * self.rate / 10
+        slow = [] if not self._has_memory() or lowest >= memory else -2 * np.pi * np.geomspace(
+            lowest, memory, 2 * int(np.ceil(1.25 * np.log10(memory / lowest))))
+        real = [p.real for p in poles_s if not p.imag]
+        pairs = [q for p in poles_s if p.imag > 0 for q in (p, np.conj(p))]
+        # pairs first: a section takes two poles, so an odd real one stands alone at the end
+        return taps, np.exp(np.r_[pairs, np.sort(np.r_[real, slow])].astype(complex) / self.rate)
+
+    def _has_memory(self):
+        """Whether the target still varies at frequencies that the taps cannot resolve."""
+        if self.band[0]:
+            return True
+        slow = self.grid < 0.02 * self.band[1]
+        target = self.target[slow]
+        # what a smooth response (a polynomial in s) would do down there is taken out
+        s = 1j * self.grid[slow] / self.band[1]
+        smooth = np.stack([s**0, s, s**2], axis=1)
+        fit = np.linalg.lstsq(_real(smooth), np.r_[target.real, target.imag], rcond=None)[0]
+        return bool(np.max(np.abs(target - smooth @ fit)) > 1e-5 * np.max(np.abs(target)))
+
+    def _columns(self, frequency, taps, poles):
+        z = np.exp(-2j * np.pi * frequency / self.rate)
+        columns = [taps.columns(z)]
+        for pole in poles:
+            if not pole.imag:
+                columns.append(((1 - pole) / (1 - pole * z))[:, None])
+            elif pole.imag > 0:
+                section = abs(1 - pole)**2 / ((1 - pole * z) * (1 - np.conj(pole) * z))
+                columns.append(np.stack([section, section * z], axis=1))
+        return np.concatenate(columns, axis=1)
+
+    def _filter(self, unknowns, taps, poles):
+        rest = iter(unknowns[taps.unknowns:])
+        residues = []
+        for pole in poles:
+            if not pole.imag:
+                residues.append((1 - pole) * next(rest))
+            elif pole.imag > 0:
+                scale = abs(1 - pole)**2
+                numerator = scale * (next(rest) + next(rest) / pole)
+                residue = numerator * pole / (pole - np.conj(pole))
+                residues += [residue, np.conj(residue)]
+        return ParallelFilter(taps.taps(unknowns[:taps.unknowns]), poles, np.array(residues, complex),
+                              self.lead)
+
+
+def _choose_delay(problems, rate, max_delay_s, tolerance):
+    """Common delay [samples] of all axes."""
+    period = rate / min(problem.band[1] for problem in problems)
+    longest = max(problem.longest for problem in problems)
+    if max_delay_s is not None:
+        longest = min(longest, int(max_delay_s * rate * (1 + 1e-9)))
+    shares = (0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3, 4, 6, 8)
+    usual = 4 * period if max_delay_s is None else longest
+    ladder = sorted({min(int(np.ceil(share * period)), longest) for share in shares} | {longest})
+    best, best_excess, smallest = None, np.inf, np.inf
+    for delay in ladder:
+        if best is not None and delay > np.ceil(usual):
+            break
+        designs = [problem.solve(delay, tolerance) for problem in problems]
+        error = _worst(designs)
+        smallest = min(smallest, error)
+        if error > tolerance:
+            continue
+        excess = max(d.noise_gain / p.ideal_noise_gain for d, p in zip(designs, problems))
+        if excess < best_excess:
+            best, best_excess = delay, excess
+        if max_delay_s is None and excess <= NOISE_EXCESS:
+            break
+    if best is None:
+        raise DesignError(_cannot(problems, rate, max_delay_s, tolerance, smallest, longest))
+    return best
+
+
+def _worst(designs):
+    return max(max(d.amplitude_error, np.radians(d.phase_error_deg)) for d in designs)
+
+
+def _cannot(problems, rate, max_delay_s, tolerance, smallest, longest):
+    """Say what was asked for, and a delay or tolerance with which it can be met."""
+    low = min(problem.band[0] for problem in problems)
+    high = max(problem.band[1] for problem in problems)
+    what = f"a worst error of {tolerance:.2g} from {low:.4g} to {high:.4g} Hz at {rate:.6g} Hz"
+    most = max(problem.longest for problem in problems)
+    delay = longest + 1
+    while max_delay_s is not None and delay <= most:
+        if _worst([problem.solve(delay, tolerance) for problem in problems]) <= tolerance:
+            return (f"{what} needs a delay of {_rounded_up(delay / rate, 6)} s, but max_delay_s is "
+                    f"{max_delay_s:.3g} s; there the error is {smallest:.2g}")
+        delay = int(np.ceil(1.2 * delay))
+    possible = smallest
+    while possible < 0.5:
+        possible = float(_rounded_up(possible, 2))
+        if _worst([problem.solve(longest, possible) for problem in problems]) <= possible:
+            return f"{what} cannot be met, only with tolerance={possible:g} or in a smaller bandwidth"
+        possible *= 1.2
+    return f"{what} cannot be met at all; ask for a smaller bandwidth"
+
+
+def _rounded_up(value, digits):
+    """Decimal text of at least `value` with so many significant digits."""
+    unit = 10.0 ** (np.floor(np.log10(value)) + 1 - digits)
+    return f"{np.ceil(value / unit * (1 - 1e-12)) * unit:.{digits}g}"
+
+
+@dataclasses.dataclass(frozen=True)
+class _SmoothTaps:
+    """Few unknowns for about `count` taps that vary slowly: cubic B-splines `step` taps apart.
+
+    A response that ends far below the sampling rate needs no more; with step 1 these are the taps.
+    """
+
+    unknowns: int
+    step: int
+
+    @classmethod
+    def of_length(cls, count, step):
+        return cls(max(4, int(np.ceil((count - 4 * step + 3) / step)) + 1), step)
+
+    @property
+    def length(self):
+        return (self.unknowns + 3) * self.step - 3
+
+    def kernel(self):
+        kernel = np.ones(1)
+        for _ in range(4):
+            kernel = np.convolve(kernel, np.ones(self.step) / self.step)
+        return kernel
+
+    def columns(self, z):
+        """Response of each unknown at z**-1 = `z`, shape (len(z), unknowns)."""
+        shape = np.polyval(self.kernel(), z)
+        return shape[:, None] * np.vander(z**self.step, self.unknowns, increasing=True)
+
+    def taps(self, unknowns):
+        spread = np.zeros((self.unknowns - 1) * self.step + 1)
+        spread[::self.step] = unknowns
+        return np.convolve(spread, self.kernel())
+
+
+def _positive(value, name):
+    if not np.isfinite(value) or value <= 0:
+        raise FracAccelError(f"{name}: {value} given, expected a number above 0")
+    return float(value)
+
+
+def _band(axis, name, rate, bandwidth_hz, lowest_hz):
+    """Lowest and highest frequency [Hz] of the correction of one axis."""
+    nyquist = rate / 2
+    core = axis.effective_core
+    top = min(nyquist, core.sampling_rate_hz / 2) if isinstance(core, Arx) else nyquist
+    reference = reference_gain(axis)
+    if not reference > 0:
+        raise DesignError(f"axis {name}: the model's gain is zero, there is nothing to invert")
+    grid = np.geomspace(1e-4 * LOWEST_SHARE * rate, NYQUIST_SHARE * top, 8000)
+    usable = np.abs(_evaluate(axis.transfer_function, grid, rate)) >= GAIN_AT_BAND_EDGE * reference
+    if bandwidth_hz is not None and bandwidth_hz >= 0.95 * top:
+        raise DesignError(f"bandwidth_hz: {bandwidth_hz:g} given, expected below {0.95 * top:g} "
+                          f"(0.95 of the Nyquist frequency)")
+    if not usable.any():
+        raise DesignError(f"axis {name}: nowhere up to {NYQUIST_SHARE * top:.4g} Hz does the sensor "
+                          f"keep {GAIN_AT_BAND_EDGE:.0%} of its gain; a higher sampling rate is "
+                          "needed")
+    first = int(np.argmax(usable))
+    after = np.flatnonzero(~usable[first:])
+    last = first + (int(after[0]) if len(after) else len(grid) - first) - 1
+    low = 0.0 if first == 0 else float(grid[first])
+    low = low if lowest_hz is None else float(lowest_hz)
+    high = float(grid[last]) if bandwidth_hz is None else float(bandwidth_hz)
+    if low >= high:
+        raise DesignError(f"axis {name}: the band from {low:.4g} Hz to {high:.4g} Hz is empty")
+    return low, high
+
+
+def reference_gain(axis):
+    """Gain of an axis on its plateau [output units per m/s²]."""
+    links = (axis.effective_core, *axis.effects)
+    return float(np.prod([link.reference_gain() for link in links]))
+
+
+def _band_grid(band, rate, poles_s):
+    low, high = band
+    grid = [np.linspace(low, high, 300), np.geomspace(max(low, LOWEST_SHARE * rate), high, 150)]
+    for pole in poles_s:
+        centre, width = abs(pole.imag) / (2 * np.pi), abs(pole.real) / (2 * np.pi)
+        if width < 0.1 * centre:
+            grid.append(centre + width * np.linspace(-6, 6, 25))
+    grid = np.unique(np.concatenate(grid))
+    return grid[(grid >= low) & (grid <= high)]
+
+
+def _refined(grid):
+    """The grid with three points more in each of its gaps, except beside zero."""
+    gaps = grid[np.flatnonzero(grid)[0]:]
+    between = [gaps[:-1] + share * np.diff(gaps) for share in (0.25, 0.5, 0.75)]
+    return np.unique(np.concatenate([grid, *between]))
+
+
+def _evaluate(target, frequency, rate):
+    """Target on a grid of frequencies [Hz]; at zero, its limit."""
+    return target(2j * np.pi * np.maximum(frequency, 1e-9 * LOWEST_SHARE * rate))
+
+
+def _real(matrix):
+    return np.concatenate([matrix.real, matrix.imag])

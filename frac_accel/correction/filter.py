@@ -1,0 +1,117 @@
+"""Stable, causal filter of the correction: taps and a bank of recursive sections in parallel."""
+
+import dataclasses
+
+import numpy as np
+from scipy.signal import lfilter
+
+
+@dataclasses.dataclass(frozen=True)
+class ParallelFilter:
+    r"""Discrete filter :math:`G(z) = \sum_k b_k z^{-k} + \sum_j r_j / (1 - p_j z^{-1})`.
+
+    The taps do the fast part. Real poles close to one carry the long memory of fractional damping
+    and of a high-pass at the price of a few multiplications, and complex pairs cancel the zeros of
+    a sensor exactly.
+
+    Attributes
+    ----------
+    taps : ndarray, shape (n_taps,)
+    poles : ndarray of complex, shape (n_poles,)
+        In the z plane, inside the unit circle, complex ones in adjacent conjugate pairs.
+    residues : ndarray of complex, shape (n_poles,)
+    lead : int
+        Whole samples by which the input waits before all this.
+    """
+
+    taps: np.ndarray
+    poles: np.ndarray
+    residues: np.ndarray
+    lead: int = 0
+
+    def frequency_response(self, frequency_hz, sampling_rate_hz):
+        """Complex response at `frequency_hz` [Hz], any shape."""
+        z = np.exp(-2j * np.pi * np.asarray(frequency_hz, float) / sampling_rate_hz)
+        recursive = (self.residues / (1 - self.poles * z[..., None])).sum(axis=-1)
+        return (np.polyval(self.taps[::-1], z) + recursive) * z**self.lead
+
+    @property
+    def static_gain(self):
+        """Response to a constant input."""
+        return float(self.taps.sum() + (self.residues / (1 - self.poles)).sum().real)
+
+    @property
+    def noise_gain(self):
+        """Standard deviation of the output per standard deviation of white noise at the input.
+
+        The square root of the sum of the squared impulse response, in closed form: the slow poles
+        would need millions of terms.
+        """
+        powers = self.poles[:, None] ** np.arange(len(self.taps))
+        cross = 2 * (self.residues[:, None] * powers * self.taps).sum()
+        tail = np.outer(self.residues, self.residues) / (1 - np.outer(self.poles, self.poles))
+        return float(np.sqrt(max(np.sum(self.taps**2) + (cross + tail.sum()).real, 0.0)))
+
+    def unknown_history(self, count):
+        """Weight of what came before the filter's start, `count` samples ago (array).
+
+        Bound of the output's part that a unit history would still make after that many samples;
+        the taps have then been filled.
+        """
+        decay = np.abs(self.poles) ** (np.asarray(count) - self.lead)[..., None]
+        return (np.abs(self.residues) / np.abs(1 - self.poles) * decay).sum(axis=-1)
+
+    def sections(self):
+        """Numerators and denominators of the recursive sections, two poles in each."""
+        pairs = []
+        for i in range(0, len(self.poles), 2):
+            poles, residues = self.poles[i:i + 2], self.residues[i:i + 2]
+            if len(poles) == 2:
+                numerator = [residues.sum(), -(residues * poles[::-1]).sum()]
+                denominator = [1.0, -poles.sum(), poles.prod()]
+            else:
+                numerator, denominator = [residues[0]], [1.0, -poles[0]]
+            pairs.append((np.real(numerator), np.real(denominator)))
+        return pairs
+
+
+class FilterState:
+    """A `ParallelFilter` running over the samples of one axis, in blocks of any length.
+
+    Every output is computed by the same operations in the same order however the record is split,
+    so the numbers are the same to the last bit.
+
+    Parameters
+    ----------
+    parallel_filter : ParallelFilter
+    level : float
+        The input before the first sample: a constant.
+    """
+
+    def __init__(self, parallel_filter, level=0.0):
+        # lfilter convolves a pure FIR by another, length-dependent route: a zero keeps it away
+        links = [(np.asarray(parallel_filter.taps, float), np.array([1.0, 0.0]))]
+        links += parallel_filter.sections()
+        self._links = [(b, a, level * _steady_state(b, a)) for b, a in links]
+        self._waiting = np.full(parallel_filter.lead, float(level))
+
+    def process(self, values):
+        """Outputs for the next inputs, shape (n,)."""
+        if len(self._waiting):
+            queue = np.concatenate([self._waiting, values])
+            values, self._waiting = queue[:len(values)], queue[len(values):]
+        total = None
+        for i, (b, a, state) in enumerate(self._links):
+            output, state = lfilter(b, a, values, zi=state)
+            self._links[i] = (b, a, state)
+            total = output if total is None else total + output
+        return total
+
+
+def _steady_state(b, a):
+    """State of `lfilter` after a unit input for ever."""
+    order = max(len(a), len(b)) - 1
+    b, a = (np.pad(c, (0, order + 1 - len(c))) for c in (b, a))
+    gain = b.sum() / a.sum()
+    # z_i = b_{i+1} - a_{i+1} gain + z_{i+1}: transposed direct form II at rest in its steady state
+    return np.cumsum((b[1:] - a[1:] * gain)[::-1])[::-1]

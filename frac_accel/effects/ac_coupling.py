@@ -1,0 +1,28 @@
+"""First-order high-pass of the conditioner."""
+
+import dataclasses
+
+import numpy as np
+
+from ..parameters import parameter
+from .base import CONDITIONER, Effect
+
+
+@dataclasses.dataclass(frozen=True)
+class AcCoupling(Effect):
+    r"""First-order high-pass :math:`s / (s + \omega_c)`."""
+
+    cause = "ac_coupling"
+    stage = CONDITIONER
+    explanation = "The conditioner is coupled through a high-pass, so slow motion is lost."
+
+    corner_hz: float = parameter("Hz", above=0)
+
+    def transfer_function(self, s):
+        return s / (s + 2 * np.pi * self.corner_hz)
+
+    def poles(self):
+        return np.array([-2 * np.pi * self.corner_hz])
+
+    def zeros(self):
+        return np.array([0.0])

@@ -1,0 +1,48 @@
+"""Response of an axis to the acceleration along the others."""
+
+import dataclasses
+
+import numpy as np
+
+from ..errors import ModelError
+from ..parameters import parameter
+from .base import CROSS_AXIS, Effect
+
+
+@dataclasses.dataclass(frozen=True)
+class CrossAxisSensitivity(Effect):
+    """Adds a share of each other axis's output; the coefficient of the axis itself is not used."""
+
+    cause = "cross_axis_sensitivity"
+    stage = CROSS_AXIS
+    explanation = "The sensor also answers to motion across its axis."
+
+    x: float = parameter("1", minimum=-1, maximum=1, default=0.0)
+    y: float = parameter("1", minimum=-1, maximum=1, default=0.0)
+    z: float = parameter("1", minimum=-1, maximum=1, default=0.0)
+
+    @classmethod
+    def matrix(cls, by_axis):
+        """3 by 3 matrix that turns outputs without cross-axis sensitivity into those with it."""
+        matrix = np.eye(3)
+        for axis, effect in by_axis.items():
+            matrix[axis] = effect.x, effect.y, effect.z
+            matrix[axis, axis] = 1.0
+        return matrix
+
+    @classmethod
+    def simulate(cls, values, by_axis):
+        return _mix(values, cls.matrix(by_axis))
+
+    @classmethod
+    def invert(cls, values, by_axis):
+        matrix = cls.matrix(by_axis)
+        if np.linalg.cond(matrix) > 1e3:
+            raise ModelError("effects: cross_axis_sensitivity cannot be inverted, its axes are "
+                             "nearly the same direction")
+        return _mix(values, np.linalg.inv(matrix))
+
+
+def _mix(values, matrix):
+    """values @ matrix.T, summed in a fixed order: BLAS would round by the block's length."""
+    return sum(values[:, [axis]] * matrix[:, axis] for axis in range(3))

@@ -1,0 +1,26 @@
+"""First-order low-pass of the conditioner."""
+
+import dataclasses
+
+import numpy as np
+
+from ..parameters import parameter
+from .base import CONDITIONER, Effect
+
+
+@dataclasses.dataclass(frozen=True)
+class LowPassLag(Effect):
+    r"""First-order low-pass :math:`\omega_c / (s + \omega_c)`."""
+
+    cause = "low_pass_lag"
+    stage = CONDITIONER
+    explanation = "A first-order low-pass in the conditioner makes fast motion smaller and later."
+
+    corner_hz: float = parameter("Hz", above=0)
+
+    def transfer_function(self, s):
+        corner = 2 * np.pi * self.corner_hz
+        return corner / (s + corner)
+
+    def poles(self):
+        return np.array([-2 * np.pi * self.corner_hz])

@@ -1,0 +1,36 @@
+"""Resonance of the mounting between base and sensor."""
+
+import dataclasses
+
+import numpy as np
+
+from ..parameters import parameter
+from .base import MOUNTING, Effect
+
+
+@dataclasses.dataclass(frozen=True)
+class MountingResonance(Effect):
+    r"""Transmissibility of a spring and damper under the sensor.
+
+    .. math:: \frac{2 \zeta_m \omega_m s + \omega_m^2}{s^2 + 2 \zeta_m \omega_m s + \omega_m^2}
+
+    S. S. Rao, *Mechanical Vibrations*, 5th ed., equation (3.68).
+    """
+
+    cause = "mounting_resonance"
+    stage = MOUNTING
+    explanation = "The mounting is a spring: it has a resonance of its own below the sensor."
+
+    frequency_hz: float = parameter("Hz", above=0)
+    damping_ratio: float = parameter("1", above=0, maximum=100)
+
+    def transfer_function(self, s):
+        u = s / (2 * np.pi * self.frequency_hz)
+        damper = 2 * self.damping_ratio * u
+        return (damper + 1) / (u * u + damper + 1)
+
+    def poles(self):
+        return 2 * np.pi * self.frequency_hz * np.roots([1, 2 * self.damping_ratio, 1])
+
+    def zeros(self):
+        return np.array([-np.pi * self.frequency_hz / self.damping_ratio])

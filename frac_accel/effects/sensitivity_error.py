@@ -1,0 +1,25 @@
+"""Sensitivity that differs from the model's."""
+
+import dataclasses
+
+import numpy as np
+
+from ..parameters import parameter
+from .base import GAIN, Effect
+
+
+@dataclasses.dataclass(frozen=True)
+class SensitivityError(Effect):
+    """Constant gain, as a ratio to the sensitivity of the core."""
+
+    cause = "sensitivity_error"
+    stage = GAIN
+    explanation = "The sensitivity differs from the model's by a constant ratio."
+
+    gain: float = parameter("1")
+
+    def transfer_function(self, s):
+        return np.full_like(s, self.gain, dtype=complex)
+
+    def reference_gain(self):
+        return abs(self.gain)

@@ -1,0 +1,21 @@
+"""Delay between the motion and its stamp."""
+
+import dataclasses
+
+from ..parameters import parameter
+from .base import DELAY, Effect
+
+
+@dataclasses.dataclass(frozen=True)
+class TimeDelay(Effect):
+    """The value stamped t belongs to t - delay; the correction takes it out of the stamp."""
+
+    cause = "time_delay"
+    stage = DELAY
+    explanation = "The samples are stamped later than the motion that they show."
+
+    # no accelerometer is later than this: a larger number is in milliseconds
+    delay_s: float = parameter("s", minimum=-10, maximum=10)
+
+    def pure_delay_s(self):
+        return self.delay_s

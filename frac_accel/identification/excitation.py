@@ -1,0 +1,84 @@
+"""What the reference can tell: whether it excites enough to identify a model, and in which band."""
+
+import numpy as np
+from scipy.signal import coherence, find_peaks, medfilt, welch
+
+from ..errors import IdentificationError
+
+# Power of a line or band, of the strongest, below which it is not excitation but noise or leakage.
+_FLOOR = 1e-4
+# Share of the sensor's power that must come from the reference.
+_COHERENT = 0.8
+
+
+def excited_band(reference, sensor, sampling_rate_hz):
+    """Band in which the reference has power and the sensor answers to it.
+
+    Parameters
+    ----------
+    reference, sensor : ndarray, shape (n,)
+    sampling_rate_hz : float
+
+    Returns
+    -------
+    tuple of float
+        Lowest and highest frequency [Hz] between which both hold for most frequencies.
+    """
+    frequency, power = _spectrum(reference, sampling_rate_hz)
+    _, shared = coherence(reference, sensor, sampling_rate_hz, "hann", _segment(reference) // 4)
+    shared = np.interp(frequency, np.linspace(0, sampling_rate_hz / 2, len(shared)), shared)
+    strong = ((power > _FLOOR * power.max()) & (shared > _COHERENT)).astype(float)
+    most = np.flatnonzero(medfilt(strong, 5))
+    if not len(most):
+        most = np.flatnonzero(power > 0.1 * power.max())
+    # the window smears what is next to zero into it
+    low = frequency[most[0]] if most[0] > 2 else 0.0
+    return float(low), float(frequency[most[-1]])
+
+
+def persistent_excitation(reference, sampling_rate_hz):
+    """Order of persistent excitation and the lines that give it.
+
+    Each sine is persistently exciting of order 2 (L. Ljung, *System Identification*, 2nd ed.,
+    section 13.2); a stretch of continuous spectrum counts as many as its width holds.
+
+    Returns
+    -------
+    order : int
+    lines_hz : list of float
+        Centres of the separate lines and stretches.
+    """
+    frequency, power = _spectrum(reference, sampling_rate_hz)
+    # a Hann window spreads a pure line over a few bins, and its side lobes are below the floor
+    peaks, _ = find_peaks(np.r_[0, power, 0], height=_FLOOR * power.max())
+    lines = frequency[peaks - 1]
+    separate = lines[np.r_[True, np.diff(lines) > 4 * (frequency[1] - frequency[0])]] \
+        if len(lines) else lines
+    return 2 * len(separate), [float(line) for line in separate]
+
+
+def require_excitation(reference, sampling_rate_hz, parameters):
+    """Refuse data that cannot identify so many parameters.
+
+    Raises
+    ------
+    IdentificationError
+        Saying what is excited, how much is needed and where.
+    """
+    order, lines = persistent_excitation(reference, sampling_rate_hz)
+    if order >= parameters:
+        return
+    needed = -(-parameters // 2)
+    where = " and ".join(f"{line:.4g} Hz" for line in lines) or "nothing"
+    raise IdentificationError(
+        f"the reference excites only {where}: persistently exciting of order {order}, but "
+        f"{parameters} parameters are to be identified; excite at least {needed} frequencies, "
+        f"spread below and across the sensor's resonance, or use noise, a sweep or a shock")
+
+
+def _spectrum(reference, sampling_rate_hz):
+    return welch(reference, sampling_rate_hz, "hann", _segment(reference), detrend="constant")
+
+
+def _segment(reference):
+    return min(len(reference), max(256, len(reference) // 4))

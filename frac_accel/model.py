@@ -1,0 +1,361 @@
+"""Sensor model: a core and its effects for each axis, read from and written to YAML."""
+
+import dataclasses
+import difflib
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from .core import CORES
+from .effects import known_effects
+from .errors import ModelError
+from .parameters import as_mapping, build, number, plain
+
+SCHEMA = "frac_accel/sensor_model/1"
+AXES = "xyz"
+_OWN_KEYS = ("schema", "core", "effects", "axes")
+_LARGEST_FILE = 10_000_000
+
+
+@dataclasses.dataclass(frozen=True)
+class AxisModel:
+    """Model of one axis.
+
+    Attributes
+    ----------
+    core : Oscillator, Arx or FractionalTransferFunction
+        Linear core as the file gives it.
+    effects : tuple of Effect
+        In signal order.
+    """
+
+    core: object
+    effects: tuple = ()
+
+    @property
+    def effective_core(self):
+        """Core after the effects that change its parameters."""
+        core = self.core
+        for effect in self.effects:
+            core = effect.change_core(core)
+        return core
+
+    @property
+    def delay_s(self):
+        """Sum of the pure delays [s]: the value stamped t belongs to t - delay_s."""
+        return sum(effect.pure_delay_s() for effect in self.effects)
+
+    @property
+    def dynamics(self):
+        """The core and the linear links around it, without pure delays."""
+        return (self.effective_core, *self.effects)
+
+    def transfer_function(self, s):
+        """Composite linear response without its pure delay, at complex `s` [rad/s]."""
+        s = np.asarray(s, complex)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.prod([link.transfer_function(s) for link in self.dynamics], axis=0)
+
+    def poles(self):
+        """Poles of the composite response [rad/s]."""
+        return np.concatenate([link.poles() for link in self.dynamics])
+
+    def zeros(self):
+        """Zeros of the composite response [rad/s]."""
+        return np.concatenate([link.zeros() for link in self.dynamics])
+
+
+class SensorModel:
+    """How a three-axis accelerometer turns acceleration into its output.
+
+    Parameters
+    ----------
+    core : Oscillator, Arx or FractionalTransferFunction
+        Core of all three axes.
+    effects : iterable of Effect
+        Effects on all three axes.
+    axes : dict of str to AxisModel, optional
+        Models of the axes ``"x"``, ``"y"``, ``"z"`` that differ.
+    metadata : dict, optional
+        Further keys of the file, such as uncertainties and provenance.
+
+    Raises
+    ------
+    ModelError
+        Naming the field, its value and what was expected.
+    """
+
+    def __init__(self, core, effects=(), axes=None, metadata=None):
+        self.metadata = dict(metadata or {})
+        self._common = AxisModel(core, _in_signal_order(effects))
+        self._own = {name: AxisModel(axis.core, _in_signal_order(axis.effects))
+                     for name, axis in (axes or {}).items()}
+        self.axes = tuple(self._own.get(name, self._common) for name in AXES)
+        for name, axis in zip(AXES, self.axes):
+            axis.effective_core.require_stable(f"axes.{name}.core" if name in self._own else "core")
+
+    @property
+    def core(self):
+        """Core of the axes that have no model of their own."""
+        return self._common.core
+
+    @property
+    def effects(self):
+        """Effects on the axes that have no model of their own."""
+        return self._common.effects
+
+    def axis(self, axis):
+        """AxisModel of ``"x"``, ``"y"``, ``"z"`` or 0, 1, 2."""
+        return self.axes[AXES.index(axis) if isinstance(axis, str) else axis]
+
+    @property
+    def noise_std(self):
+        """Standard deviation of the sensor's white noise [output units]; 0 where not known."""
+        return float(self.metadata.get("noise_std", 0.0))
+
+    @property
+    def band_hz(self):
+        """Lowest and highest frequency [Hz] for which the model was identified, or None."""
+        return self.metadata.get("band_hz")
+
+    def frequency_response(self, frequency_hz, axis="x"):
+        """Exact complex frequency response, pure delay included.
+
+        Parameters
+        ----------
+        frequency_hz : array_like
+            Frequencies [Hz], any shape.
+        axis : str or int
+
+        Returns
+        -------
+        ndarray of complex
+            Output units per m/s², same shape. Offset and cross-axis terms have no part in it.
+        """
+        s = 2j * np.pi * np.asarray(frequency_hz, float)
+        model = self.axis(axis)
+        return model.transfer_function(s) * np.exp(-s * model.delay_s)
+
+    def apply_sample_effects(self, values):
+        """Effects that act on the samples after the linear response; shape (n, 3) in and out."""
+        for effect, by_axis in self._sample_stages():
+            values = effect.simulate(values, by_axis)
+        return values
+
+    def remove_sample_effects(self, values):
+        """Inverse of `apply_sample_effects`."""
+        for effect, by_axis in reversed(self._sample_stages()):
+            values = effect.invert(values, by_axis)
+        return values
+
+    def _sample_stages(self):
+        """Pairs of effect class and its instances by axis index, in signal order."""
+        stages = {}
+        for index, axis in enumerate(self.axes):
+            for effect in axis.effects:
+                stages.setdefault((effect.stage, effect.cause), {})[index] = effect
+        return [(type(next(iter(by_axis.values()))), by_axis)
+                for _, by_axis in sorted(stages.items(), key=lambda item: item[0])]
+
+    @classmethod
+    def from_dict(cls, data, where=""):
+        """Model from the content of a model file.
+
+        Parameters
+        ----------
+        data : dict
+        where : str
+            Name of the file, for messages.
+
+        Raises
+        ------
+        ModelError
+            Naming the field, its value and what was expected.
+        """
+        try:
+            return cls._from_dict(data)
+        except ModelError as error:
+            raise ModelError(f"{where}: {error}" if where else str(error)) from None
+
+    @classmethod
+    def _from_dict(cls, data):
+        _require_mapping(data, "model")
+        _require_known_keys(data)
+        if data.get("schema") != SCHEMA:
+            raise ModelError(f"schema: {data.get('schema')!r} given, expected {SCHEMA!r}")
+        core = _core(data["core"], "core") if "core" in data else None
+        effects = _effects(data.get("effects"), "effects")
+        axes = {}
+        for name, entry in _require_mapping(data.get("axes") or {}, "axes").items():
+            where = f"axes.{name}"
+            if name not in tuple(AXES):
+                raise ModelError(f"{where}: no such axis, expected x, y or z")
+            _require_mapping(entry, where)
+            for key in entry:
+                if key not in ("core", "effects"):
+                    raise ModelError(f"{where}.{key}: no such key, expected core or effects")
+            axis_core = _core(entry["core"], f"{where}.core") if "core" in entry else core
+            axis_effects = (_effects(entry["effects"], f"{where}.effects")
+                            if "effects" in entry else effects)
+            if axis_core is None:
+                raise ModelError(f"{where}.core: missing, and there is no core for all axes")
+            axes[name] = AxisModel(axis_core, axis_effects)
+        if core is None:
+            if set(axes) != set(AXES):
+                raise ModelError("core: missing, expected a mapping such as {natural_frequency_hz: "
+                                 "180.0, damping_ratio: 0.15}")
+            core = axes["x"].core
+        if "noise_std" in data and number(data["noise_std"], "noise_std") < 0:
+            raise ModelError(f"noise_std: {data['noise_std']} given, expected at least 0")
+        if "band_hz" in data:
+            _require_band(data["band_hz"])
+        metadata = {key: plain(data[key]) for key in data if key not in _OWN_KEYS}
+        return cls(core, effects, axes, metadata)
+
+    def to_dict(self):
+        """Content of the model file; inverse of `from_dict`."""
+        data = {"schema": SCHEMA, **_axis_to_dict(self._common)}
+        if self._own:
+            data["axes"] = {name: _axis_to_dict(axis) for name, axis in self._own.items()}
+        return plain({**data, **self.metadata})
+
+    @classmethod
+    def load(cls, path):
+        """Model from a YAML file.
+
+        Raises
+        ------
+        ModelError
+            Naming the file, the field, its value and what was expected.
+        """
+        try:
+            with open(path, encoding="utf-8") as file:
+                text = file.read(_LARGEST_FILE + 1)
+        except (OSError, UnicodeDecodeError) as error:
+            reason = getattr(error, "strerror", None) or "not a text file"
+            raise ModelError(f"{path}: cannot read the model: {reason}") from None
+        if len(text) > _LARGEST_FILE:
+            raise ModelError(f"{path}: larger than {_LARGEST_FILE // 1_000_000} MB, "
+                             "expected a sensor model")
+        try:
+            data = yaml.load(text, Loader=_Loader)
+        except (yaml.YAMLError, RecursionError, ValueError) as error:
+            mark = getattr(error, "problem_mark", None)
+            line = f", line {mark.line + 1}" if mark else ""
+            problem = getattr(error, "problem", None) or type(error).__name__
+            raise ModelError(f"{path}{line}: not valid YAML: {problem}") from None
+        return cls.from_dict(data, where=str(path))
+
+    def save(self, path):
+        """Write the model as YAML; the file is complete or not there."""
+        path = Path(path)
+        text = yaml.safe_dump(self.to_dict(), sort_keys=False, allow_unicode=True)
+        try:
+            handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+            with open(handle, "w", encoding="utf-8") as file:
+                file.write(text)
+            # mkstemp makes the file for its owner alone
+            umask = os.umask(0)
+            os.umask(umask)
+            os.chmod(temporary, 0o666 & ~umask)
+            os.replace(temporary, path)
+        except OSError as error:
+            raise ModelError(f"{path}: cannot write the model: {error.strerror}") from None
+
+
+class _Loader(yaml.SafeLoader):
+    """Safe YAML without aliases (a small file could unfold to fill the memory) or twin keys."""
+
+    def compose_node(self, parent, index):
+        if self.check_event(yaml.AliasEvent):
+            event = self.peek_event()
+            raise yaml.composer.ComposerError(None, None, "an alias, which a model does not need",
+                                              event.start_mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node, deep=False):
+        seen = set()
+        for key, _ in node.value:
+            if key.value in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"the key {key.value!r} stands twice", key.start_mark)
+            seen.add(key.value if isinstance(key.value, str) else str(key.value))
+        return super().construct_mapping(node, deep)
+
+
+def _in_signal_order(effects):
+    effects = tuple(sorted(effects, key=lambda effect: effect.stage))
+    causes = [effect.cause for effect in effects]
+    for cause in causes:
+        if causes.count(cause) > 1:
+            raise ModelError(f"effects: {cause} given {causes.count(cause)} times, expected once")
+    return effects
+
+
+def _require_mapping(value, where):
+    if not isinstance(value, dict):
+        kind = "nothing" if value is None else f"{value!r:.60}"
+        raise ModelError(f"{where}: {kind} given, expected a mapping")
+    return value
+
+
+def _require_known_keys(data):
+    """A further key is kept; one that looks like a misspelt key of ours is refused."""
+    for key in data:
+        if not isinstance(key, str):
+            raise ModelError(f"model: the key {key!r} given, expected text")
+        close = difflib.get_close_matches(key, _OWN_KEYS, n=1, cutoff=0.75)
+        if close and key not in _OWN_KEYS:
+            raise ModelError(f"{key}: no such key; did you mean {close[0]!r}?")
+
+
+def _require_band(band):
+    expected = "two numbers in Hz, at least 0 and ascending"
+    if not isinstance(band, list) or len(band) != 2:
+        raise ModelError(f"band_hz: {band!r:.60} given, expected {expected}")
+    low, high = (number(edge, f"band_hz[{i}]", expected) for i, edge in enumerate(band))
+    if not 0 <= low < high:
+        raise ModelError(f"band_hz: {band!r} given, expected {expected}")
+
+
+def _core(entry, where):
+    entry = dict(_require_mapping(entry, where))
+    kind = entry.pop("type", "oscillator")
+    if kind not in CORES:
+        raise ModelError(f"{where}.type: {kind!r} given, expected one of {', '.join(CORES)}")
+    try:
+        return build(CORES[kind], entry, where)
+    except ModelError as error:
+        # a core's own check knows its fields, not where in the file it stands
+        text = str(error)
+        raise ModelError(text if text.startswith(where) else
+                         where + text.removeprefix("core")) from None
+
+
+def _effects(entries, where):
+    if entries is None:
+        return ()
+    if not isinstance(entries, list):
+        raise ModelError(f"{where}: {entries!r:.60} given, expected a list of effects")
+    effects = []
+    for i, entry in enumerate(entries):
+        place = f"{where}[{i}]"
+        entry = dict(_require_mapping(entry, place))
+        cause = entry.pop("cause", None)
+        known = known_effects()
+        if cause not in known:
+            close = difflib.get_close_matches(str(cause), known, n=1)
+            hint = f"; did you mean {close[0]!r}?" if close else ""
+            raise ModelError(f"{place}.cause: unknown cause {cause!r}, expected one of "
+                             f"{', '.join(sorted(known))}{hint}")
+        effects.append(build(known[cause], entry, place))
+    return tuple(effects)
+
+
+def _axis_to_dict(axis):
+    core = {"type": axis.core.type, **as_mapping(axis.core)}
+    effects = [{"cause": effect.cause, **as_mapping(effect)} for effect in axis.effects]
+    return {"core": core, "effects": effects}

@@ -1,0 +1,204 @@
+"""A measured pair: one axis of a reference and of a sensor on the same uniform instants."""
+
+import dataclasses
+
+import numpy as np
+
+from .bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
+from .correction.timing import estimate_rate
+from .errors import FracAccelError
+from .model import AXES
+
+# Rates of the two topics may differ by this share: what stamps of a short record leave open.
+_SAME_RATE = 1e-3
+_FEWEST = 32
+
+
+@dataclasses.dataclass(frozen=True)
+class Pair:
+    """Reference and sensor on uniform instants.
+
+    Attributes
+    ----------
+    sampling_rate_hz : float
+    reference : ndarray, shape (n, 3)
+        Acceleration [m/s²]; bridged linearly where a sample is missing.
+    sensor : ndarray, shape (n, 3)
+        Output in the sensor's units.
+    valid : ndarray of bool, shape (n,)
+        False where either of the two is missing.
+    lag_s : float
+        Time [s] by which the sensor's instants are later than the reference's; within half a
+        sampling interval.
+    start_ns : int
+        Stamp of the first reference sample.
+    sensor_std : float
+        Standard deviation that the messages themselves state for the sensor's noise; NaN without.
+    """
+
+    sampling_rate_hz: float
+    reference: np.ndarray
+    sensor: np.ndarray
+    valid: np.ndarray
+    lag_s: float
+    start_ns: int
+    sensor_std: float
+
+    def __len__(self):
+        return len(self.valid)
+
+
+def load_pair(bag, reference=REFERENCE_TOPIC, sensor=RAW_TOPIC, axis="x"):
+    """Pair of two topics of a bag; parameters and errors as in `make_pair` and `read_bag`."""
+    topics = read_bag(bag, [reference, sensor])
+    try:
+        return make_pair(topics[reference], topics[sensor], axis)
+    except FracAccelError as error:
+        raise type(error)(f"{bag}: {error}") from None
+
+
+def make_pair(reference, sensor, axis="x"):
+    """Put two runs of samples on the same uniform instants.
+
+    Parameters
+    ----------
+    reference, sensor : Samples
+    axis : {"x", "y", "z"}
+        The axis that must hold a signal.
+
+    Returns
+    -------
+    Pair
+
+    Raises
+    ------
+    FracAccelError
+        If a topic has too few samples, no signal on the axis, stamps that do not advance, another
+        rate than the other or no time in common with it.
+    """
+    column = AXES.index(axis)
+    usable = {"reference": clean(reference), "sensor": clean(sensor)}
+    rates = {}
+    for name, (stamps, values) in usable.items():
+        if len(stamps) < _FEWEST:
+            raise FracAccelError(f"{name}: {len(stamps)} usable sample(s), expected at least "
+                                 f"{_FEWEST} whose stamps advance and whose values are finite")
+        rates[name] = _long_term_rate(stamps)
+        if np.ptp(values[:, column]) == 0:
+            others = [other for other in AXES if np.ptp(values[:, AXES.index(other)]) > 0]
+            hint = f"; there is signal on {' and '.join(others)}" if others else ""
+            raise FracAccelError(f"{name}: axis {axis} is constant at {values[0, column]:g}{hint}")
+    rate, other = rates["reference"], rates["sensor"]
+    if abs(rate / other - 1) > _SAME_RATE:
+        raise FracAccelError(f"the reference has {rate:.6g} Hz and the sensor {other:.6g} Hz, "
+                             "expected the same rate: resample one of them first")
+    interval = 1e9 / rate
+    start = int(usable["reference"][0][0])
+    slots = {name: np.round((stamps - start) / interval) for name, (stamps, _) in usable.items()}
+    # jitter averages out of the mean; a common clock offset between the two topics stays
+    lag = float(np.median(usable["sensor"][0] - start - slots["sensor"] * interval)
+                - np.median(usable["reference"][0] - start - slots["reference"] * interval))
+    first = int(max(slots["reference"][0], slots["sensor"][0]))
+    last = int(min(slots["reference"][-1], slots["sensor"][-1]))
+    if last - first + 1 < _FEWEST:
+        raise FracAccelError("reference and sensor have no time in common: the reference's stamps "
+                             f"run from {_seconds(usable['reference'][0])}, the sensor's from "
+                             f"{_seconds(usable['sensor'][0])}")
+    grid = np.arange(first, last + 1)
+    gridded, present = {}, np.ones(len(grid), bool)
+    for name, (_, values) in usable.items():
+        place = np.clip(np.searchsorted(slots[name], grid), 0, len(values) - 1)
+        here = slots[name][place] == grid
+        present &= here
+        gridded[name] = np.stack([np.interp(grid, slots[name], values[:, i]) for i in range(3)], 1)
+        gridded[name][here] = values[place[here]]
+    std = np.sqrt(np.nanmean(sensor.variance[:, column])) \
+        if np.isfinite(sensor.variance[:, column]).any() else np.nan
+    return Pair(rate, gridded["reference"], gridded["sensor"], present, lag * 1e-9,
+                int(start + first * interval), float(std))
+
+
+@dataclasses.dataclass(frozen=True)
+class UniformRecord:
+    """Samples on uniform instants.
+
+    Attributes
+    ----------
+    sampling_rate_hz : float
+    values : ndarray, shape (n, 3)
+        Bridged linearly where a sample is missing.
+    index : ndarray of int, shape (m,)
+        Samples of the record that are usable.
+    slot : ndarray of int, shape (m,)
+        Their places among the uniform instants.
+    bridged : int
+        Number of instants without a sample.
+    """
+
+    sampling_rate_hz: float
+    values: np.ndarray
+    index: np.ndarray
+    slot: np.ndarray
+    bridged: int
+
+
+def uniform(samples, where):
+    """Put one run of samples on uniform instants.
+
+    Parameters
+    ----------
+    samples : Samples or None
+    where : str
+        What the samples are, for messages.
+
+    Returns
+    -------
+    UniformRecord
+
+    Raises
+    ------
+    FracAccelError
+        If there are too few samples whose stamps advance and whose values are finite.
+    """
+    good = _good(samples) if samples is not None else np.zeros(0, bool)
+    index = np.flatnonzero(good)
+    if len(index) < 2:
+        raise FracAccelError(f"{where}: {len(index)} usable sample(s), expected at least 2 whose "
+                             "stamps advance and whose values are finite")
+    stamps, values = samples.stamps_ns[index], samples.values[index]
+    rate = _long_term_rate(stamps)
+    slot = np.round((stamps - stamps[0]) * rate * 1e-9).astype(np.int64)
+    # stamps that scatter so much that two samples share an instant: the first one counts
+    first = np.r_[True, np.diff(slot) > 0]
+    index, slot, values = index[first], slot[first], values[first]
+    grid = np.arange(slot[-1] + 1)
+    if len(grid) > 100 * len(slot):
+        raise FracAccelError(f"{where}: {len(slot)} samples are spread over {len(grid)} sampling "
+                             "intervals, expected a record without such gaps")
+    filled = np.stack([np.interp(grid, slot, values[:, i]) for i in range(3)], axis=1)
+    return UniformRecord(rate, filled, index, slot, len(grid) - len(slot))
+
+
+def clean(samples):
+    """Stamps and values of the samples whose stamps advance and whose values are finite."""
+    good = _good(samples)
+    return samples.stamps_ns[good], samples.values[good]
+
+
+def _good(samples):
+    ahead = np.maximum.accumulate(samples.stamps_ns)
+    good = np.isfinite(samples.values).all(axis=1)
+    good[1:] &= samples.stamps_ns[1:] > ahead[:-1]
+    return good
+
+
+def _long_term_rate(stamps):
+    """Rate over the whole record: the short-term estimate says how many intervals it holds."""
+    interval = 1e9 / estimate_rate(stamps)
+    # count interval by interval: over the whole record an error of the estimate adds up
+    counts = np.maximum(np.round(np.diff(stamps) / interval), 1)
+    return 1e9 * counts.sum() / float(stamps[-1] - stamps[0])
+
+
+def _seconds(stamps):
+    return f"{stamps[0] * 1e-9:.3f} s to {stamps[-1] * 1e-9:.3f} s"

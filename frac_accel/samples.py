@@ -1,0 +1,57 @@
+"""A run of acceleration samples as plain arrays: what bags and topics turn into."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Samples(NamedTuple):
+    """Samples of one topic.
+
+    Attributes
+    ----------
+    stamps_ns : int64 (n,)
+        Header stamps in nanoseconds (not log times), in the order of the log.
+    values : float64 (n, 3)
+        Acceleration along x, y, z, in the unit in which it was published.
+    variance : float64 (n, 3)
+        Diagonal of ``linear_acceleration_covariance``; NaN where it is unknown (all zeros,
+        or element 0 is -1) and for message types without a covariance.
+    frame_id : str
+        Frame of the first sample.
+    """
+
+    stamps_ns: np.ndarray
+    values: np.ndarray
+    variance: np.ndarray
+    frame_id: str
+
+    @classmethod
+    def of(cls, stamps_ns, values, variance=None, frame_id: str = "accel_link") -> Samples:
+        """Samples from anything array-like; raises ValueError on shapes that do not fit."""
+        stamps_ns = np.asarray(stamps_ns, dtype=np.int64)
+        values = np.asarray(values, dtype=np.float64)
+        if variance is None:
+            variance = np.full(values.shape, np.nan)
+        variance = np.asarray(variance, dtype=np.float64)
+        expected = (stamps_ns.size, 3)
+        if stamps_ns.ndim != 1 or values.shape != expected or variance.shape != expected:
+            raise ValueError(
+                f"stamps of shape {stamps_ns.shape} need values and variance of shape (n, 3), "
+                f"got {values.shape} and {variance.shape}"
+            )
+        return cls(stamps_ns, values, variance, frame_id)
+
+    @classmethod
+    def concatenate(cls, blocks: list[Samples]) -> Samples:
+        """One run from consecutive blocks (at least one); the first block's frame is kept."""
+        if len(blocks) == 1:
+            return blocks[0]
+        return cls(
+            np.concatenate([block.stamps_ns for block in blocks]),
+            np.concatenate([block.values for block in blocks]),
+            np.concatenate([block.variance for block in blocks]),
+            blocks[0].frame_id,
+        )

@@ -1,0 +1,269 @@
+"""Damaged and foreign bags: what is whole is read, everything else is one clear `BagError`."""
+
+import os
+import resource
+import struct
+
+import numpy as np
+import pytest
+import zstandard
+from bag_fixtures import random_samples, write_foreign_bag
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import Chunk, Header
+from mcap.writer import CompressionType
+
+from frac_accel import cdr
+from frac_accel.bag import BagError, BagReader, BagWriter, read_bag, write_bag
+from frac_accel.bag.mcap_file import MAGIC
+
+TOPICS = {"/imu/reference": random_samples(1, 200), "/imu/data_raw": random_samples(2, 200)}
+EVERY_MESSAGE = {
+    name: list(cdr.encode_samples(cdr.IMU, samples)) for name, samples in TOPICS.items()
+}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    path = tmp_path_factory.mktemp("whole") / "bag.mcap"
+    write_foreign_bag(path, TOPICS)
+    return path.read_bytes()
+
+
+def records(data: bytes):
+    """Opcode, start and end of each top-level record."""
+    at = len(MAGIC)
+    while at < len(data) - len(MAGIC):
+        opcode, length = struct.unpack_from("<BQ", data, at)
+        yield opcode, at, at + 9 + length
+        at += 9 + length
+
+
+def read_all(path):
+    """All that can be read, which must be true messages in order."""
+    reader = BagReader(path)
+    data = {}
+    for message in reader.messages():
+        data.setdefault(message.topic, []).append(message.data)
+    return reader, data
+
+
+def is_subsequence(part, everything):
+    rest = iter(everything)
+    return all(one in rest for one in part)
+
+
+def test_a_cut_bag_is_read_up_to_the_cut(whole, tmp_path):
+    path = tmp_path / "cut.mcap"
+    chunk_ends = [end for opcode, _, end in records(whole) if opcode == Opcode.CHUNK]
+    readable = 0
+    for size in [*range(0, len(whole), 97), *chunk_ends, *(end - 1 for end in chunk_ends)]:
+        path.write_bytes(whole[:size])
+        try:
+            reader, data = read_all(path)
+        except BagError as error:
+            assert size < chunk_ends[0], error
+            assert str(path) in str(error)
+            continue
+        readable += 1
+        assert reader.recovered or size > len(whole) - 8
+        count = sum(len(messages) for messages in data.values())
+        assert count == reader.message_count
+        assert count >= 400 * sum(end <= size for end in chunk_ends) // len(chunk_ends) - 25
+        for topic, messages in data.items():
+            assert messages == EVERY_MESSAGE[topic][: len(messages)]
+    assert readable > 50
+
+
+def test_a_chunk_with_a_wrong_checksum_is_skipped(whole, tmp_path):
+    path = tmp_path / "crc.mcap"
+    chunks = [start for opcode, start, _ in records(whole) if opcode == Opcode.CHUNK]
+    damaged = bytearray(whole)
+    damaged[chunks[2] + 9 + 24] ^= 1  # uncompressed_crc
+    path.write_bytes(damaged)
+    reader, data = read_all(path)
+    assert reader.recovered and "checksum" in reader.warnings[0]
+    assert 300 < sum(len(messages) for messages in data.values()) < 400
+    for topic, messages in data.items():
+        assert is_subsequence(messages, EVERY_MESSAGE[topic])
+    for chunk in chunks:
+        damaged[chunk + 9 + 24] = whole[chunk + 9 + 24] ^ 1
+    path.write_bytes(damaged)
+    with pytest.raises(BagError, match="readable"):
+        read_all(path)
+
+
+def test_random_damage_raises_bag_errors_only(whole, tmp_path):
+    rng = np.random.default_rng(20260601)
+    path = tmp_path / "fuzz.mcap"
+    outcomes = {"read": 0, "refused": 0}
+    for _ in range(400):
+        damaged = bytearray(whole)
+        for at in rng.integers(0, len(whole), size=rng.integers(1, 6)):
+            damaged[at] = rng.integers(0, 256)
+        # Half of the damage goes where the lengths are.
+        starts = [start for _, start, _ in records(whole)]
+        for start in rng.choice(starts, size=rng.integers(0, 3)):
+            damaged[int(start) + int(rng.integers(0, 60)) % (len(whole) - int(start))] = int(
+                rng.integers(0, 256)
+            )
+        if rng.random() < 0.3:
+            del damaged[int(rng.integers(0, len(damaged))) :]
+        path.write_bytes(damaged)
+        try:
+            read_all(path)
+            read_bag(path)
+            outcomes["read"] += 1
+        except BagError as error:
+            assert "\n" not in str(error)
+            outcomes["refused"] += 1
+    assert min(outcomes.values()) > 20, outcomes
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", ""])
+def test_absurd_lengths_are_not_allocated(tmp_path, compression):
+    """Chunks that claim terabytes are skipped; the process may grow by 300 MB at most."""
+    bomb = zstandard.ZstdCompressor().compress(bytes(2**26))
+    claims_much = zstandard.ZstdCompressor(write_content_size=True).compress(b"x" * 100)
+    limit = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss + 300 * 1024
+    for data in (bomb, claims_much, b"", os.urandom(100)):
+        for declared in (0, 100, 2**28 - 1, 2**40, 2**63):
+            builder = RecordBuilder()
+            Header("ros2", "").write(builder)
+            Chunk(compression, data, 0, 0, 0, declared).write(builder)
+            path = tmp_path / "bomb.mcap"
+            path.write_bytes(MAGIC + builder.end())
+            with pytest.raises(BagError):
+                read_all(path)
+    for length in (2**31, 2**62, 2**64 - 1):
+        for opcode in range(1, 16):
+            path.write_bytes(MAGIC + struct.pack("<BQ", opcode, length) + bytes(100))
+            with pytest.raises(BagError):
+                read_all(path)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < limit
+
+
+def test_a_frame_that_claims_another_size_than_its_chunk(tmp_path):
+    frame = bytearray(zstandard.ZstdCompressor().compress(bytes(2**20)))
+    assert zstandard.get_frame_parameters(bytes(frame)).content_size == 2**20
+    frame[5:9] = struct.pack("<I", 2**32 - 1)
+    builder = RecordBuilder()
+    Header("ros2", "").write(builder)
+    Chunk("zstd", bytes(frame), 0, 0, 0, 2**20).write(builder)
+    (tmp_path / "bag.mcap").write_bytes(MAGIC + builder.end())
+    with pytest.raises(BagError, match="nothing is readable"):
+        BagReader(tmp_path / "bag.mcap")
+
+
+def content(data):
+    return lambda path: path.write_bytes(data)
+
+
+def foreign(**options):
+    return lambda path: write_foreign_bag(path, TOPICS, **options)
+
+
+def folder(metadata=None, **files):
+    def write(path):
+        path.mkdir()
+        if metadata is not None:
+            (path / "metadata.yaml").write_text(metadata)
+        for name, data in files.items():
+            (path / f"{name}.mcap").write_bytes(data)
+
+    return write
+
+
+def empty_bag(path):
+    BagWriter(path.with_suffix(".mcap")).close()
+    path.with_suffix(".mcap").rename(path)
+
+
+def without_messages(path):
+    with BagWriter(path.with_suffix(".mcap")) as writer:
+        writer.add_topic("/imu/data_raw", cdr.IMU)
+    path.with_suffix(".mcap").rename(path)
+
+
+def malformed_message(path):
+    with BagWriter(path.with_suffix(".mcap")) as writer:
+        writer.add_topic("/imu/data_raw", cdr.IMU)
+        writer.write("/imu/data_raw", EVERY_MESSAGE["/imu/data_raw"][0][:-3], 1)
+    path.with_suffix(".mcap").rename(path)
+
+
+INFORMATION = "rosbag2_bagfile_information:\n  relative_file_paths: [a.mcap]\n"
+
+
+@pytest.mark.parametrize(
+    "write, says",
+    [
+        (lambda path: None, "no such bag"),
+        (content(b""), "is empty"),
+        (content(b"hello world, this is no bag"), "not an MCAP file"),
+        (content(b"#ROSBAG V2.0\n" + bytes(100)), "ROS 1"),
+        (content(b"SQLite format 3\0" + bytes(100)), "sqlite3"),
+        (content(MAGIC), "nothing is readable"),
+        (content(MAGIC + MAGIC), "nothing is readable"),
+        (foreign(profile="ros1"), "profile 'ros1', expected 'ros2'"),
+        (foreign(message_encoding="json", schema_encoding="jsonschema"), "encoded as json"),
+        (foreign(message_encoding="protobuf", schema_encoding="protobuf"), "as protobuf"),
+        (foreign(message_encoding="ros1", schema_encoding="ros1msg"), "encoded as ros1"),
+        (
+            foreign(type_name="std_msgs/msg/String"),
+            "has type std_msgs/msg/String, expected sensor_msgs/msg/Imu or",
+        ),
+        (empty_bag, "has no topic /imu/data_raw; it has no topics"),
+        (without_messages, "topic /imu/data_raw has no messages"),
+        (malformed_message, "topic /imu/data_raw: sensor_msgs/msg/Imu message of 321 bytes"),
+        (
+            lambda path: write_foreign_bag(path, {"/other": TOPICS["/imu/data_raw"]}),
+            r"has no topic /imu/data_raw; it has /other \(sensor_msgs/msg/Imu\)",
+        ),
+        (folder(), "neither metadata.yaml nor"),
+        (folder("[" * 5000), "not the metadata"),
+        (folder("a: 1"), "not the metadata"),
+        (folder(INFORMATION + "  storage_identifier: sqlite3"), "storage is 'sqlite3'"),
+        (folder(INFORMATION + "  storage_identifier: mcap"), "none of the files"),
+        (folder(None, a=b""), "file is empty"),
+        (
+            folder(INFORMATION + "  storage_identifier: mcap\n  compression_mode: file", a=b"x"),
+            "compressed by rosbag2",
+        ),
+    ],
+)
+def test_the_error_says_what_is_wrong_and_where(tmp_path, write, says):
+    path = tmp_path / "input"
+    write(path)
+    with pytest.raises(BagError, match=says) as caught:
+        read_bag(path, ["/imu/data_raw"])
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_metadata_cannot_name_files_outside_the_folder(tmp_path):
+    write_bag(tmp_path / "secret.mcap", TOPICS)
+    bag = tmp_path / "bag"
+    folder(INFORMATION.replace("a.mcap", "../secret.mcap") + "  storage_identifier: mcap")(bag)
+    with pytest.raises(BagError, match="none of the files"):
+        BagReader(bag)
+
+
+def test_a_topic_of_two_types_is_refused(tmp_path):
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    write_bag(bag / "bag_0.mcap", TOPICS)
+    write_foreign_bag(bag / "bag_1.mcap", TOPICS, type_name="std_msgs/msg/String")
+    with pytest.raises(BagError, match="two types"):
+        BagReader(bag)
+
+
+def test_chunks_that_all_overlap_do_not_eat_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr("frac_accel.bag.reader.MAX_OPEN_BYTES", 30_000)
+    path = tmp_path / "overlap.mcap"
+    write_foreign_bag(path, TOPICS, compression=CompressionType.LZ4)
+    assert len(read_all(path)[1]) == 2
+    topics = {f"/topic{i}": random_samples(i, 200) for i in range(10)}
+    write_foreign_bag(path, topics, one_topic_after_the_other=True)
+    with pytest.raises(BagError, match="overlap"):
+        read_all(path)
