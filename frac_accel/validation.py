@@ -8,10 +8,32 @@ from .correction import Corrector
 from .correction.design import reference_gain
 from .errors import FracAccelError
 from .identification.excitation import excited_band
-from .metrics import error_metrics, interpolate, octave_bands
+from .metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
 from .model import AXES
 from .pair import clean, make_pair
+from .samples import Samples
 from .simulation import simulate
+
+
+@dataclasses.dataclass(frozen=True)
+class Comparison:
+    """Errors of raw and corrected samples of one axis against the reference.
+
+    Attributes
+    ----------
+    raw, scaled, corrected : ErrorMetrics
+        Of the raw samples as they are, divided by the model's sensitivity, and corrected.
+    stamps_ns, reference, before, after : ndarray, shape (n,)
+        What was compared: instants, the reference there, scaled raw and corrected samples.
+    """
+
+    raw: ErrorMetrics
+    scaled: ErrorMetrics
+    corrected: ErrorMetrics
+    stamps_ns: np.ndarray
+    reference: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,32 +44,24 @@ class Validation:
     ----------
     simulation : ErrorMetrics
         Of the simulated against the measured output.
-    raw, scaled, corrected : ErrorMetrics
-        Against the reference: of the raw samples as they are, divided by the model's sensitivity,
-        and corrected.
-    stamps_ns, reference, before, after : ndarray, shape (n,)
-        What was compared: instants, reference, scaled raw samples and corrected samples.
+    comparison : Comparison
+        Of raw and corrected samples against the reference.
     filters : dict
         Summary of the inverse filters.
     counters : dict of str to int
         Fate of the samples.
     """
 
-    simulation: object
-    raw: object
-    scaled: object
-    corrected: object
-    stamps_ns: np.ndarray
-    reference: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
+    simulation: ErrorMetrics
+    comparison: Comparison
     filters: dict
     counters: dict
 
     def as_dict(self):
         """Plain numbers, without the compared signals."""
-        return {**{name: getattr(self, name).as_dict()
-                   for name in ("simulation", "raw", "scaled", "corrected")},
+        return {"simulation": self.simulation.as_dict(),
+                **{name: getattr(self.comparison, name).as_dict()
+                   for name in ("raw", "scaled", "corrected")},
                 "filters": self.filters, "counters": self.counters}
 
 
@@ -71,25 +85,55 @@ def validate(reference, sensor, model, axis="x", **wishes):
     FracAccelError
         If the pair cannot be compared.
     """
+    pair = make_pair(reference, sensor, axis)
+    corrector = Corrector(model, **wishes)
+    parts = [corrector.process(sensor.stamps_ns, sensor.values, sensor.variance),
+             corrector.finish()]
+    stamps, values = (np.concatenate([getattr(part, name) for part in parts])
+                      for name in ("stamps_ns", "values"))
+    if not len(stamps):
+        raise FracAccelError(f"{len(sensor.stamps_ns)} samples are fewer than the filter needs to "
+                             f"warm up ({corrector.design.warm_up_samples})")
+    comparison = compare(reference, sensor, Samples.of(stamps, values), corrector.design, axis)
+    bands = [band.band_hz for band in comparison.corrected.bands]
+    return Validation(
+        simulation=error_metrics(*_simulated(model, pair, AXES.index(axis)),
+                                 pair.sampling_rate_hz, bands),
+        comparison=comparison, filters=corrector.design.summary(), counters=corrector.counters)
+
+
+def compare(reference, sensor, corrected, design, axis="x"):
+    """Errors of raw and corrected samples against the reference.
+
+    Parameters
+    ----------
+    reference, sensor, corrected : Samples
+    design : FilterDesign
+        That of the correction.
+    axis : {"x", "y", "z"}
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    FracAccelError
+        If the records have too little in common.
+    """
     column = AXES.index(axis)
     pair = make_pair(reference, sensor, axis)
     rate = pair.sampling_rate_hz
-    corrector = Corrector(model, **{"sample_rate_hz": 0.0, **wishes})
-    parts = [corrector.process(sensor.stamps_ns, sensor.values, sensor.variance),
-             corrector.finish()]
-    stamps, after, index = (np.concatenate([getattr(part, name) for part in parts])
-                            for name in ("stamps_ns", "values", "index"))
-    design = corrector.design
-    if not len(stamps):
-        raise FracAccelError(f"{len(sensor.stamps_ns)} samples are fewer than the filter needs to "
-                             f"warm up ({design.warm_up_samples})")
     known = clean(reference)
-    truth = interpolate(*known, stamps, rate)[:, column]
-    truth_raw = interpolate(*known, sensor.stamps_ns[index], rate)[:, column]
-    raw = sensor.values[index, column]
-    run = _longest_run(np.isfinite(truth) & np.isfinite(truth_raw), stamps, rate)
-    truth, truth_raw, raw, after, stamps = (
-        part[run] for part in (truth, truth_raw, raw, after[:, column], stamps))
+    # the raw sample of a corrected one still has the sensor's delay in its stamp
+    raw_stamps = corrected.stamps_ns + design.sensor_delay_ns
+    place = np.minimum(np.searchsorted(sensor.stamps_ns, raw_stamps), len(sensor.stamps_ns) - 1)
+    truth = interpolate(*known, corrected.stamps_ns, rate)[:, column]
+    truth_raw = interpolate(*known, raw_stamps, rate)[:, column]
+    run = _longest_run(np.isfinite(truth) & np.isfinite(truth_raw)
+                       & (sensor.stamps_ns[place] == raw_stamps), corrected.stamps_ns, rate)
+    truth, truth_raw, stamps = truth[run], truth_raw[run], corrected.stamps_ns[run]
+    raw, after = sensor.values[place[run], column], corrected.values[run, column]
     low, high = excited_band(pair.reference[:, column], pair.sensor[:, column], rate)
     band = design.axes[column].band_hz
     low, high = max(low, band[0]), min(high, band[1])
@@ -97,14 +141,12 @@ def validate(reference, sensor, model, axis="x", **wishes):
         raise FracAccelError("the reference has no power in the band of the correction, "
                              f"{band[0]:.4g} Hz to {band[1]:.4g} Hz")
     bands = octave_bands(low, high)
-    scaled = raw / (reference_gain(model.axis(axis)) * np.sign(_sign(model, axis)))
-    return Validation(
-        simulation=error_metrics(*_simulated(model, pair, column), rate, bands),
+    scaled = raw / plateau(design.model.axis(axis))
+    return Comparison(
         raw=error_metrics(truth_raw, raw, rate, bands),
         scaled=error_metrics(truth_raw, scaled, rate, bands),
         corrected=error_metrics(truth, after, rate, bands),
-        stamps_ns=stamps, reference=truth, before=scaled, after=after,
-        filters=design.summary(), counters=corrector.counters)
+        stamps_ns=stamps, reference=truth, before=scaled, after=after)
 
 
 def _simulated(model, pair, column):
@@ -118,10 +160,10 @@ def _simulated(model, pair, column):
     return pair.sensor[run, column], shifted[run]
 
 
-def _sign(model, axis):
-    """Polarity of the model's plateau."""
-    core = model.axis(axis).effective_core
-    return getattr(core, "sensitivity", 1.0)
+def plateau(axis):
+    """Gain of an axis on its plateau, with its polarity."""
+    core = axis.effective_core
+    return reference_gain(axis) * np.sign(getattr(core, "sensitivity", 1.0))
 
 
 def _longest_run(good, stamps_ns, rate):

@@ -2,7 +2,15 @@
 
 from ..identification import identify
 from ..pair import load_pair
-from ._common import add_bag, add_json, add_topics, provenance, require_output, write_json
+from ._common import (
+    add_bag,
+    add_json,
+    add_topics,
+    open_bag,
+    provenance,
+    require_output,
+    write_json,
+)
 
 
 def add_arguments(parser):
@@ -18,6 +26,7 @@ def add_arguments(parser):
 def run(arguments):
     """Do it."""
     require_output(arguments.output, arguments.bag)
+    open_bag(arguments.bag)
     pair = load_pair(arguments.bag, arguments.reference, arguments.sensor, arguments.axis)
     command = (f"frac_accel identify {arguments.bag} --structure {arguments.structure} --reference "
                f"{arguments.reference} --sensor {arguments.sensor} --axis {arguments.axis}")

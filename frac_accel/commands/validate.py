@@ -44,8 +44,8 @@ def run(arguments):
 def table(result, axis):
     """Metrics as text."""
     signals = [("simulated against measured output", result.simulation),
-               ("raw / sensitivity against reference", result.scaled),
-               ("corrected against reference", result.corrected)]
+               ("raw / sensitivity against reference", result.comparison.scaled),
+               ("corrected against reference", result.comparison.corrected)]
     lines = []
     for title, metrics in signals:
         lines.append(f"{title}, axis {axis}")
@@ -61,5 +61,6 @@ def table(result, axis):
     lines.append(f"filter: {low:.4g} to {high:.4g} Hz, delay {filters['filter_delay_s']:.4g} s "
                  f"(and the sensor's own {filters['sensor_delay_s']:.4g} s, taken out of the "
                  f"stamps), worst error {design['worst_amplitude_error']:.2%} and "
-                 f"{design['worst_phase_error_deg']:.3f} deg, noise gain {design['noise_gain']:.3g}")
+                 f"{design['worst_phase_error_deg']:.3f} deg, "
+                 f"noise gain {design['noise_gain']:.3g}")
     return "\n".join(lines)

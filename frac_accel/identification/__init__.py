@@ -157,9 +157,10 @@ def _notes(parameters, nrmse, held_out, pair, fit, highest):
     for name in ("sensitivity", "natural_frequency_hz", "damping_ratio"):
         entry = parameters[name]
         if entry["std"] > _UNDETERMINED * abs(entry["value"]):
-            share = min(entry["std"] / abs(entry["value"]), 1e4)
-            notes.append(f"{name} is not determined by these data (standard uncertainty "
-                         f"{share:.0%} of its value)")
+            share = entry["std"] / abs(entry["value"])
+            size = f"{share:.0%} of" if share < 10 else "more than ten times"
+            notes.append(f"{name} is not determined by these data (standard uncertainty {size} "
+                         "its value)")
     resonance = parameters["natural_frequency_hz"]["value"]
     if highest < resonance / 3:
         notes.append(f"the excitation ends at {highest:.4g} Hz, far below the resonance at "

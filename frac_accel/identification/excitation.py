@@ -1,12 +1,14 @@
 """What the reference can tell: whether it excites enough to identify a model, and in which band."""
 
 import numpy as np
-from scipy.signal import coherence, find_peaks, medfilt, welch
+from scipy.signal import coherence, medfilt, welch
 
 from ..errors import IdentificationError
 
 # Power of a line or band, of the strongest, below which it is not excitation but noise or leakage.
 _FLOOR = 1e-4
+# Bins over which the window (its side lobes are 92 dB down) spreads a pure line.
+_LINE_BINS = 8
 # Share of the sensor's power that must come from the reference.
 _COHERENT = 0.8
 
@@ -46,15 +48,16 @@ def persistent_excitation(reference, sampling_rate_hz):
     -------
     order : int
     lines_hz : list of float
-        Centres of the separate lines and stretches.
+        Frequencies of the lines, or places within a stretch of continuous spectrum.
     """
     frequency, power = _spectrum(reference, sampling_rate_hz)
-    # a Hann window spreads a pure line over a few bins, and its side lobes are below the floor
-    peaks, _ = find_peaks(np.r_[0, power, 0], height=_FLOOR * power.max())
-    lines = frequency[peaks - 1]
-    separate = lines[np.r_[True, np.diff(lines) > 4 * (frequency[1] - frequency[0])]] \
-        if len(lines) else lines
-    return 2 * len(separate), [float(line) for line in separate]
+    strong = np.flatnonzero(power > _FLOOR * power.max())
+    stretches = np.split(strong, np.flatnonzero(np.diff(strong) > 1) + 1) if len(strong) else []
+    lines = []
+    for stretch in stretches:
+        count = max(1, round(len(stretch) / _LINE_BINS))
+        lines += [float(np.mean(part)) for part in np.array_split(frequency[stretch], count)]
+    return 2 * len(lines), lines
 
 
 def require_excitation(reference, sampling_rate_hz, parameters):
@@ -69,7 +72,7 @@ def require_excitation(reference, sampling_rate_hz, parameters):
     if order >= parameters:
         return
     needed = -(-parameters // 2)
-    where = " and ".join(f"{line:.4g} Hz" for line in lines) or "nothing"
+    where = " and ".join(f"{line:.4g} Hz" for line in lines)
     raise IdentificationError(
         f"the reference excites only {where}: persistently exciting of order {order}, but "
         f"{parameters} parameters are to be identified; excite at least {needed} frequencies, "
@@ -77,7 +80,8 @@ def require_excitation(reference, sampling_rate_hz, parameters):
 
 
 def _spectrum(reference, sampling_rate_hz):
-    return welch(reference, sampling_rate_hz, "hann", _segment(reference), detrend="constant")
+    return welch(reference, sampling_rate_hz, "blackmanharris", _segment(reference),
+                 detrend="constant")
 
 
 def _segment(reference):

@@ -11,8 +11,12 @@ from ..simulation import Convolution
 PARAMETERS = ("sensitivity", "natural_frequency_hz", "damping_ratio", "delay_s", "offset")
 # Samples at both ends that the band-limited simulation cannot know, besides the unknown start.
 _EDGE = 32
-_START_FREQUENCIES = 10
-_START_DAMPINGS = (0.03, 0.2, 0.7)
+_START_FREQUENCIES = 16
+_STARTS = 3
+# Share of the output's power, times the number of independent frequencies, that the best of all
+# resonances and delays still explains of an unrelated signal.
+_CHANCE = 10
+_START_DAMPINGS = (0.03, 0.15, 0.7)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -158,48 +162,39 @@ class _Problem:
                          for f in self.derivatives(nonlinear)], axis=1)
 
     def coarse(self):
-        """Starting points, best first, from the spectra of the whole record."""
+        """Starting points, best first: a grid of resonances, each with its best whole delay."""
         length = 2 * self.n
         frequency = np.fft.rfftfreq(length, 1 / self.rate)
+        s = 2j * np.pi * frequency
         x = np.fft.rfft(self.reference - self.reference.mean(), length)
         y = np.fft.rfft(self.sensor - self.sensor.mean(), length)
         power = np.abs(x)**2
-        strong = (frequency > 0) & (power > 1e-6 * power.max())
-        chosen = np.flatnonzero(strong)
-        if len(chosen) > 4000:
-            chosen = chosen[np.argsort(power[chosen])[-4000:]]
-        s, x, y = 2j * np.pi * frequency[chosen], x[chosen], y[chosen]
-        span = frequency[chosen]
-        lowest, highest = np.min(span), np.max(span)
-        best = []
+        shared = power * np.abs(y)**2
+        # how many independent frequencies the two have in common; the zero padding doubles them
+        self.independent = np.sum(shared)**2 / np.sum(shared**2) / 2
+        span = frequency[(frequency > 0) & (power > 1e-6 * power.max())]
+        lowest, highest = span[0], span[-1]
+        starts = []
         for f0 in np.geomspace(max(lowest * 2, highest / 100), highest * 3, _START_FREQUENCIES):
             for zeta in _START_DAMPINGS:
-                for samples in (0.0, 1.0):
-                    start = np.array([np.log(f0), np.log(zeta), samples])
-
-                    def misfit(nonlinear):
-                        z = self.transfer_function(nonlinear)(s) * x
-                        gain = np.real(np.vdot(z, y)) / np.real(np.vdot(z, z))
-                        error = (y - gain * z) / np.linalg.norm(y)
-                        return np.r_[error.real, error.imag]
-                    fit = least_squares(misfit, start, max_nfev=12, x_scale=[0.3, 1.0, 1.0],
-                                        bounds=self.bounds())
-                    best.append((fit.cost, tuple(fit.x)))
-        best.sort()
-        return best
+                z = self.transfer_function((np.log(f0), np.log(zeta), 0.0))(s) * x
+                # correlation at each delay: the best gain is it over the simulated power
+                shared = np.fft.irfft(np.conj(z) * y, length)
+                lags = np.r_[0:self.n // 4, -(self.n // 4):0]
+                lag = lags[np.argmax(np.abs(shared[lags]))]
+                explained = shared[lag]**2 / np.sum(np.abs(z)**2)
+                starts.append((-explained, (np.log(f0), np.log(zeta), float(lag))))
+        return [start for _, start in sorted(starts)]
 
     def bounds(self):
         return ([np.log(self.rate / self.n), np.log(1e-4), -self.n / 4],
                 [np.log(50 * self.rate), np.log(20), self.n / 4])
 
     def refine(self, starts):
-        """Best of the three most promising starting points in the time domain."""
+        """Best of the most promising starting points in the time domain."""
         size = np.std(self.sensor[self.used])
         fits = []
-        for _, start in starts[:3]:
-            if fits and np.allclose(start, fits[-1][2], rtol=1e-3, atol=1e-3):
-                continue
-
+        for start in starts[:_STARTS]:
             def residual(nonlinear):
                 return self.project(nonlinear)[0] / size
 
@@ -212,11 +207,13 @@ class _Problem:
 
             fit = least_squares(residual, start, jacobian, x_scale=[0.1, 0.3, 0.3],
                                 bounds=self.bounds(), max_nfev=40, xtol=1e-10, ftol=1e-10)
-            fits.append((fit.cost, tuple(fit.x), start))
+            fits.append((fit.cost, tuple(fit.x)))
         best = min(fits)
-        if not best[0] < 0.5 * 0.999 * np.sum(self.used):
-            raise IdentificationError("the sensor's output has nothing to do with the reference: "
-                                      "no model explains more than 0.1 % of its power")
+        explained = 1 - 2 * best[0] / np.sum(self.used)
+        if explained < min(_CHANCE / self.independent, 0.5):
+            raise IdentificationError(
+                "the sensor's output has nothing to do with the reference: the best model explains "
+                f"{max(explained, 0):.2%} of its power, which chance alone can do")
         return np.array(best[1])
 
     def result(self, nonlinear):

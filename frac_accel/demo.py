@@ -1,0 +1,158 @@
+"""Demonstration: a bag is played, corrected live and recorded, over DDS, in separate processes.
+
+``make demo``, or ``python -m frac_accel.demo``. Writes the table and the picture that it shows.
+"""
+
+import argparse
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from .bag import CORRECTED_TOPIC, RAW_TOPIC, REFERENCE_TOPIC, read_bag
+from .correction import Corrector
+from .errors import FracAccelError
+from .model import AXES, SensorModel
+from .validation import compare
+
+BAGS = Path(__file__).resolve().parent.parent / "bags"
+_PATIENCE_S = 90
+
+
+def main(arguments=None):
+    """Run the demonstration; exit status 0, or 2 with one line that says what went wrong."""
+    parser = argparse.ArgumentParser(prog="python -m frac_accel.demo", description=__doc__)
+    parser.add_argument("--bag", default=BAGS / "fractional_bench.mcap", type=Path)
+    parser.add_argument("--model", default=BAGS / "fractional_bench.yaml", type=Path)
+    parser.add_argument("--output-dir", default="demo_output", type=Path)
+    chosen = parser.parse_args(arguments)
+    try:
+        run(chosen.bag, chosen.model, chosen.output_dir)
+    except FracAccelError as error:
+        print(f"demo: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def run(bag, model_file, folder):
+    """Play, correct, record, compare."""
+    folder.mkdir(parents=True, exist_ok=True)
+    recorded = folder / "demo.mcap"
+    recorded.unlink(missing_ok=True)
+    measured = read_bag(bag, [REFERENCE_TOPIC, RAW_TOPIC])
+    print(f"playing {bag.name} ({np.ptp(measured[RAW_TOPIC].stamps_ns) * 1e-9:.1f} s) -> corrector "
+          f"with {model_file.name} -> recorder", flush=True)
+    _live(bag, model_file, recorded)
+    live = read_bag(recorded, [CORRECTED_TOPIC])[CORRECTED_TOPIC]
+
+    model = SensorModel.load(model_file)
+    corrector = Corrector(model)
+    raw = measured[RAW_TOPIC]
+    offline = corrector.process(raw.stamps_ns, raw.values, raw.variance)
+    same = (np.array_equal(live.stamps_ns, offline.stamps_ns)
+            and np.array_equal(live.values, offline.values))
+    results = {axis: compare(measured[REFERENCE_TOPIC], raw, live, corrector.design, axis)
+               for axis in AXES}
+    text = table(results, len(live.stamps_ns), len(raw.stamps_ns), same)
+    print(text)
+    (folder / "demo.txt").write_text(text + "\n", encoding="utf-8")
+    picture(results, folder / "demo.png")
+    print(f"written: {recorded}, {folder / 'demo.txt'}, {folder / 'demo.png'}")
+    if not same:
+        raise FracAccelError("the live output is not the offline output")
+
+
+def table(results, live, raw, same):
+    """Errors before and after, as text."""
+    lines = [f"{live} of {raw} samples corrected live; "
+             + ("bit-identical to the offline correction" if same else
+                "DIFFERENT from the offline correction"),
+             "",
+             "axis  band [Hz]        NRMSE [%]            peak error [%]        phase error [deg]",
+             "                    before      after      before      after      before      after"]
+    for axis, result in results.items():
+        before, after = result.scaled.total, result.corrected.total
+        low, high = after.band_hz
+        lines.append(
+            f"  {axis}   {low:4.3g}-{high:<5.4g} {100 * before.nrmse:12.2f} {100 * after.nrmse:10.2f}"
+            f" {100 * before.peak_error:11.2f} {100 * after.peak_error:10.2f}"
+            f" {before.phase_error_deg:11.2f} {after.phase_error_deg:10.2f}")
+    lines.append("before: raw samples divided by the sensitivity; against the reference")
+    return "\n".join(lines)
+
+
+def picture(results, path):
+    """The first second: reference, raw and corrected, and what is left."""
+    import matplotlib
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    figure, rows = plt.subplots(len(results), 2, figsize=(12, 8), sharex=True,
+                                width_ratios=(3, 2), layout="constrained")
+    for (axis, result), (signals, errors) in zip(results.items(), rows):
+        time_s = (result.stamps_ns - result.stamps_ns[0]) * 1e-9
+        first = time_s <= 1.0
+        time_s = time_s[first]
+        signals.plot(time_s, result.before[first], color="#d98c5f", lw=1, label="raw / sensitivity")
+        signals.plot(time_s, result.reference[first], color="black", lw=2.2, label="reference")
+        signals.plot(time_s, result.after[first], color="#3f9bd8", lw=1, label="corrected")
+        signals.set_ylabel(f"{axis} [m/s²]")
+        errors.semilogy(time_s, np.abs(result.before - result.reference)[first], color="#d98c5f",
+                        lw=0.8)
+        errors.semilogy(time_s, np.abs(result.after - result.reference)[first], color="#3f9bd8",
+                        lw=0.8)
+        errors.set_ylabel("|error| [m/s²]")
+    rows[0][0].legend(loc="upper right", ncols=3, fontsize="small")
+    rows[0][0].set_title("acceleration, first second")
+    rows[0][1].set_title("error before and after correction")
+    for row in rows[-1]:
+        row.set_xlabel("time [s]")
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def _live(bag, model_file, recorded):
+    """Player, corrector and recorder as processes on a ROS domain of their own."""
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(random.randint(1, 100)),
+                   "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    reliable = [f"qos_overrides.{topic}.subscription.reliability:=reliable"
+                for topic in (RAW_TOPIC, REFERENCE_TOPIC)]
+    topics = f"[{REFERENCE_TOPIC},{RAW_TOPIC},{CORRECTED_TOPIC}]"
+    commands = {
+        "recorder": [f"bag:={recorded}", f"topics:={topics}", "idle_timeout_s:=3.0"],
+        "corrector": [f"model_file:={model_file}", "depth:=10000", *reliable],
+        "player": [f"bag:={bag}", "wait_for_subscribers:=2"],
+    }
+    processes = {}
+    try:
+        for node, parameters in commands.items():
+            arguments = [part for parameter in parameters for part in ("-p", parameter)]
+            processes[node] = subprocess.Popen(
+                [sys.executable, "-m", f"frac_accel.nodes.{node}", "--ros-args", *arguments],
+                env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        deadline = time.monotonic() + _PATIENCE_S
+        for node in ("player", "recorder"):
+            try:
+                processes[node].wait(max(deadline - time.monotonic(), 1))
+            except subprocess.TimeoutExpired:
+                raise FracAccelError(f"the {node} did not finish within {_PATIENCE_S} s") from None
+            if processes[node].returncode:
+                output = processes[node].stdout.read().strip().splitlines() or ["no word"]
+                raise FracAccelError(f"the {node} failed: {output[-1]}")
+    finally:
+        for process in processes.values():
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        for process in processes.values():
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
