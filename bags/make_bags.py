@@ -42,6 +42,8 @@ def main():
     write("fractional_bench", FRACTIONAL, excitation, rng, snr_db=60)
     excitation = rig.band_noise(rng, RATE_HZ, 4.0, (2.0, 300.0), (3.0, 0.0, 0.0), lead_s=2.0)
     write("classical_bench", CLASSICAL, excitation, rng, snr_db=40)
+    excitation = rig.sines(RATE_HZ, 1.0, [300.0], [0.0], (3.0, 0.0, 0.0), lead_s=1.0)
+    write("one_sine", CLASSICAL, excitation, rng, snr_db=40)
 
 
 def write(name, sensor, excitation, rng, snr_db):

@@ -56,7 +56,8 @@ def persistent_excitation(reference, sampling_rate_hz):
     lines = []
     for stretch in stretches:
         count = max(1, round(len(stretch) / _LINE_BINS))
-        lines += [float(np.mean(part)) for part in np.array_split(frequency[stretch], count)]
+        lines += [float(np.average(frequency[part], weights=power[part]))
+                  for part in np.array_split(stretch, count)]
     return 2 * len(lines), lines
 
 
