@@ -79,7 +79,8 @@ def table(results, live, raw, same):
         before, after = result.scaled.total, result.corrected.total
         low, high = after.band_hz
         lines.append(
-            f"  {axis}   {low:4.3g}-{high:<5.4g} {100 * before.nrmse:12.2f} {100 * after.nrmse:10.2f}"
+            f"  {axis}   {low:4.3g}-{high:<5.4g} {100 * before.nrmse:12.2f}"
+            f" {100 * after.nrmse:10.2f}"
             f" {100 * before.peak_error:11.2f} {100 * after.peak_error:10.2f}"
             f" {before.phase_error_deg:11.2f} {after.phase_error_deg:10.2f}")
     lines.append("before: raw samples divided by the sensitivity; against the reference")

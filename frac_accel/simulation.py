@@ -1,7 +1,7 @@
 """Simulation of a sensor model from a sampled reference."""
 
 import numpy as np
-from scipy.fft import next_fast_len
+from scipy.fft import irfft, next_fast_len, rfft
 
 from .core import Arx
 from .errors import FracAccelError, ModelError
@@ -49,8 +49,9 @@ def simulate(model, reference, sampling_rate_hz, axis=None, initial="rest"):
     values = np.asarray(reference, float)
     single = values.ndim == 1
     if single:
-        if axis is None:
-            raise FracAccelError("reference: one column given without axis, expected x, y or z")
+        if axis not in tuple(AXES):
+            raise FracAccelError(f"axis: {axis!r} given for a reference of one column, "
+                                 "expected x, y or z")
         column = AXES.index(axis)
         values = np.zeros((len(values), 3))
         values[:, column] = reference
@@ -61,6 +62,8 @@ def simulate(model, reference, sampling_rate_hz, axis=None, initial="rest"):
         raise FracAccelError(f"reference: sample {first} is not finite")
     if not np.isfinite(sampling_rate_hz) or sampling_rate_hz <= 0:
         raise FracAccelError(f"sampling_rate_hz: {sampling_rate_hz} given, expected above 0")
+    if initial not in ("rest", "steady"):
+        raise FracAccelError(f"initial: {initial!r} given, expected rest or steady")
     result = np.empty_like(values)
     for i, axis_model in enumerate(model.axes):
         result[:, i] = _respond(axis_model, values[:, i], sampling_rate_hz, initial)
@@ -78,8 +81,9 @@ def _respond(model, reference, rate, initial):
     moving = reference - level
     result = np.full(len(reference), level * static_gain(model) if level else 0.0)
     if moving.any():
-        result += Convolution(moving, rate, abs(model.delay_s)).response(
-            lambda s: model.transfer_function(s) * np.exp(-s * model.delay_s))
+        convolution = Convolution(moving, rate, abs(model.delay_s))
+        s = convolution.s
+        result += convolution.response(model.transfer_function(s) * np.exp(-s * model.delay_s))
     return result
 
 
@@ -103,12 +107,17 @@ class Convolution:
         sigma = _DAMPING / self._length
         self._damping = np.exp(-sigma * np.arange(self._n))
         self._s = (sigma + 2j * np.pi * np.arange(self._length // 2 + 1) / self._length) * rate
-        self._spectrum = np.fft.rfft(values * self._damping, self._length)
+        self._spectrum = rfft(values * self._damping, self._length)
 
-    def response(self, transfer_function):
-        """Response of a system given by a function of complex s [rad/s], shape (n,)."""
-        spectrum = self._spectrum * _smooth_at_nyquist(transfer_function(self._s))
-        return np.fft.irfft(spectrum, self._length)[:self._n] / self._damping
+    @property
+    def s(self):
+        """Complex frequencies [rad/s] on which a transfer function is needed."""
+        return self._s
+
+    def response(self, transfer):
+        """Response of a system, shape (n,), from its transfer function at `s`."""
+        spectrum = self._spectrum * _smooth_at_nyquist(transfer)
+        return irfft(spectrum, self._length)[:self._n] / self._damping
 
 
 def _smooth_at_nyquist(response):

@@ -15,7 +15,7 @@ def figures(name):
     """Identification of one record, and the validation of its model."""
     bag = FOLDER / f"{name}.mcap"
     topics = read_bag(bag, [REFERENCE_TOPIC, RAW_TOPIC])
-    result = identify(bag)
+    result = identify(bag, structure="oscillator")
     return result, validate(topics[REFERENCE_TOPIC], topics[RAW_TOPIC], result.model)
 
 

@@ -1,6 +1,6 @@
 """Identify a sensor model from a measured pair, with standard uncertainties."""
 
-from ..identification import identify
+from ..identification import STRUCTURES, identify
 from ..pair import load_pair
 from ._common import (
     add_bag,
@@ -16,8 +16,9 @@ from ._common import (
 def add_arguments(parser):
     """Options of the verb."""
     add_bag(parser)
-    parser.add_argument("--structure", choices=["oscillator"], default="oscillator",
-                        help="form of the model (default: %(default)s)")
+    parser.add_argument("--structure", choices=STRUCTURES, default="auto",
+                        help="form of the model; auto chooses on held-out data "
+                             "(default: %(default)s)")
     parser.add_argument("-o", "--output", required=True, metavar="M.yaml", help="model to write")
     add_topics(parser)
     add_json(parser)
@@ -36,6 +37,7 @@ def run(arguments):
     low, high = result.model.band_hz
     print(f"{len(pair)} samples at {pair.sampling_rate_hz:.6g} Hz, excited from {low:.4g} to "
           f"{high:.4g} Hz")
+    print(f"{result.structure}: {result.reason}")
     for name, entry in result.parameters.items():
         print(f"  {name:21} {entry['value']:12.6g} +- {entry['std']:.2g} {entry['unit']}")
     print(f"  residual {result.nrmse:.3%} of the output, {result.held_out_nrmse:.3%} on held-out "

@@ -10,25 +10,23 @@ from ..effects.offset import Offset
 from ..effects.time_delay import TimeDelay
 from ..errors import FracAccelError, IdentificationError
 from ..model import AXES, SensorModel
-from ..pair import load_pair
-from ..parameters import unit_of
+from ..pair import Pair, load_pair
+from ..parameters import parameter_fields, unit_of
 from ..simulation import simulate
 from .excitation import excited_band, require_excitation
-from .oscillator import PARAMETERS, fit_oscillator
+from .output_error import Fit, fit_output_error
+from .structures import FractionalStructure, OscillatorStructure
 
-__all__ = ["Identification", "identify"]
+__all__ = ["STRUCTURES", "Identification", "identify"]
 
 # The share of the record, counted by the reference's energy, that the held-out check learns from.
 _LEARN = 0.6
 # A standard uncertainty above this share of its value: the data do not determine the parameter.
 _UNDETERMINED = 0.2
-_UNITS = {
-    "sensitivity": unit_of(Oscillator, "sensitivity"),
-    "natural_frequency_hz": unit_of(Oscillator, "natural_frequency_hz"),
-    "damping_ratio": unit_of(Oscillator, "damping_ratio"),
-    "delay_s": unit_of(TimeDelay, "delay_s"),
-    "offset": unit_of(Offset, "offset"),
-}
+# Standard uncertainties by which the damping order must differ from 1 to be called fractional.
+_SIGNIFICANT = 3.0
+_STRUCTURES = {"oscillator": OscillatorStructure(), "fractional": FractionalStructure()}
+STRUCTURES = ("auto", *_STRUCTURES)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,6 +37,8 @@ class Identification:
     ----------
     model : SensorModel
         Ready to be saved; its metadata hold uncertainties, covariance, band and rate.
+    structure, reason : str
+        Structure of the model, and why it was chosen.
     parameters : dict of str to dict
         ``value``, ``std`` and ``unit`` of each parameter.
     nrmse : float
@@ -51,6 +51,8 @@ class Identification:
     """
 
     model: SensorModel
+    structure: str
+    reason: str
     parameters: dict
     nrmse: float
     held_out_nrmse: float
@@ -58,11 +60,12 @@ class Identification:
 
     def as_dict(self):
         """Plain numbers, lists and the model's content."""
-        return {"model": self.model.to_dict(), "parameters": self.parameters, "nrmse": self.nrmse,
-                "held_out_nrmse": self.held_out_nrmse, "notes": self.notes}
+        return {"model": self.model.to_dict(), "structure": self.structure,
+                "reason": self.reason, "parameters": self.parameters,
+                "nrmse": self.nrmse, "held_out_nrmse": self.held_out_nrmse, "notes": self.notes}
 
 
-def identify(pair, axis="x", structure="oscillator", provenance=None):
+def identify(pair, axis="x", structure="auto", provenance=None):
     """Identify a sensor model.
 
     Parameters
@@ -70,8 +73,10 @@ def identify(pair, axis="x", structure="oscillator", provenance=None):
     pair : Pair, str or Path
         A measured pair, or a bag with one on the default topics.
     axis : {"x", "y", "z"}
-    structure : {"oscillator"}
-        Classical seismic sensor with sensitivity, natural frequency, damping ratio and delay.
+    structure : {"auto", "oscillator", "fractional"}
+        Classical seismic sensor, one with a damping of free order, or the choice between the two:
+        the fractional one only where its order differs from 1 by three standard uncertainties and
+        it predicts held-out data better.
     provenance : dict, optional
         Where the data come from; becomes part of the model.
 
@@ -84,39 +89,102 @@ def identify(pair, axis="x", structure="oscillator", provenance=None):
     IdentificationError
         If the data cannot identify the model; says what is missing.
     """
-    if structure != "oscillator":
-        raise FracAccelError(f"structure: {structure!r} given, expected 'oscillator'")
+    if structure not in STRUCTURES:
+        raise FracAccelError(f"structure: {structure!r} given, expected one of "
+                             f"{', '.join(STRUCTURES)}")
     if isinstance(pair, (str, Path)):
         pair = load_pair(pair, axis=axis)
-    column = AXES.index(axis)
-    reference, sensor, rate = pair.reference[:, column], pair.sensor[:, column], \
-        pair.sampling_rate_hz
-    require_excitation(reference, rate, parameters=4)
-    fit = fit_oscillator(reference, sensor, rate, pair.valid, pair.lag_s)
-    low, high = excited_band(reference, sensor, rate)
-    parameters = {name: {"value": float(value), "std": float(std), "unit": _UNITS[name]}
-                  for name, value, std in zip(PARAMETERS, fit.values, fit.std)}
-    nrmse = fit.rmse / float(np.std(sensor))
-    held_out = _held_out(pair, reference, sensor)
-    notes = _notes(parameters, nrmse, held_out, pair, fit, high)
-    effects = [TimeDelay(parameters["delay_s"]["value"])]
-    if abs(fit.values[4]) > 3 * fit.std[4]:
-        effects.append(Offset(parameters["offset"]["value"]))
-    core = Oscillator(
-        natural_frequency_hz=parameters["natural_frequency_hz"]["value"],
-        damping_ratio=parameters["damping_ratio"]["value"],
-        sensitivity=parameters["sensitivity"]["value"])
-    model = SensorModel(core, effects, metadata={
+    data = _Data.of(pair, AXES.index(axis))
+    if structure == "auto":
+        chosen, reason = _choose(data)
+    else:
+        chosen, reason = _Candidate.of(structure, data), "asked for"
+    return _identification(chosen, reason, data, axis, provenance or {})
+
+
+@dataclasses.dataclass(frozen=True)
+class _Data:
+    pair: Pair
+    reference: np.ndarray
+    sensor: np.ndarray
+    spread: float
+
+    @classmethod
+    def of(cls, pair, column):
+        sensor = pair.sensor[:, column]
+        return cls(pair, pair.reference[:, column], sensor, float(np.std(sensor)))
+
+    def fit(self, structure, part=slice(None), start=None):
+        return fit_output_error(structure, self.reference[part], self.sensor[part],
+                                self.pair.sampling_rate_hz, self.pair.valid[part],
+                                self.pair.lag_s, start)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Candidate:
+    """A structure fitted to all data, and judged on data that a second fit has not seen."""
+
+    structure: object
+    name: str
+    fit: Fit
+    nrmse: float
+    held_out_nrmse: float
+
+    @classmethod
+    def of(cls, name, data):
+        structure = _STRUCTURES[name]
+        require_excitation(data.reference, data.pair.sampling_rate_hz, len(structure.names) + 2)
+        fit = data.fit(structure)
+        return cls(structure, name, fit, fit.rmse / data.spread, _held_out(structure, fit, data))
+
+
+def _choose(data):
+    """The better of classical and fractional, and why."""
+    classical = _Candidate.of("oscillator", data)
+    try:
+        fractional = _Candidate.of("fractional", data)
+    except IdentificationError as error:
+        return classical, f"the data cannot tell more: {error}"
+    order = fractional.fit["damping_order"]
+    std = fractional.fit.std[fractional.fit.names.index("damping_order")]
+    score = f"damping order {order:.4g} +- {std:.2g}"
+    held_out = (f"held-out residual {fractional.held_out_nrmse:.3%} against "
+                f"{classical.held_out_nrmse:.3%} of the classical model")
+    if abs(order - 1) <= _SIGNIFICANT * std:
+        return classical, f"a fractional damping is not significant: {score}"
+    if not fractional.held_out_nrmse < classical.held_out_nrmse:
+        return classical, f"a fractional damping does not predict better: {held_out}"
+    return fractional, f"{score} differs from 1; {held_out}"
+
+
+def _identification(chosen, reason, data, axis, provenance):
+    fit, rate = chosen.fit, data.pair.sampling_rate_hz
+    low, high = excited_band(data.reference, data.sensor, rate)
+    parameters = {name: {"value": float(value), "std": float(std), "unit": _unit(name)}
+                  for name, value, std in zip(fit.names, fit.values, fit.std)}
+    notes = _notes(parameters, chosen, data, high)
+    effects = [TimeDelay(fit["delay_s"])]
+    if abs(fit["offset"]) > _SIGNIFICANT * parameters["offset"]["std"]:
+        effects.append(Offset(fit["offset"]))
+    model = SensorModel(chosen.structure.core(fit), effects, metadata={
         "uncertainties": {name: {"std": entry["std"], "unit": entry["unit"]}
                           for name, entry in parameters.items()},
-        "covariance": {"parameters": list(PARAMETERS), "matrix": fit.covariance.tolist()},
+        "covariance": {"parameters": list(fit.names), "matrix": fit.covariance.tolist()},
         "band_hz": [low, high],
         "sampling_rate_hz": rate,
         "noise_std": _noise(fit.residual),
-        "provenance": {"axis": axis, "structure": structure, **(provenance or {})},
-        "validation": {"nrmse": nrmse, "held_out_nrmse": held_out, "notes": notes},
+        "provenance": {"axis": axis, "structure": chosen.name, "reason": reason, **provenance},
+        "validation": {"nrmse": chosen.nrmse, "held_out_nrmse": chosen.held_out_nrmse,
+                       "notes": notes},
     })
-    return Identification(model, parameters, nrmse, held_out, notes)
+    return Identification(model, chosen.name, reason, parameters, chosen.nrmse,
+                          chosen.held_out_nrmse, notes)
+
+
+def _unit(name):
+    """Unit of a parameter, from the class that declares it."""
+    return next(unit_of(cls, name) for cls in (Oscillator, TimeDelay, Offset)
+                if name in (field.name for field in parameter_fields(cls)))
 
 
 def _noise(residual):
@@ -131,30 +199,32 @@ def _noise(residual):
     return float(np.sqrt(np.median(power[len(power) // 2:]) / np.log(2) / window))
 
 
-def _held_out(pair, reference, sensor):
-    energy = np.cumsum((reference - reference.mean())**2)
+def _held_out(structure, fit, data):
+    """Residual on the last part of the record of a model fitted to the rest alone."""
+    pair = data.pair
+    energy = np.cumsum((data.reference - data.reference.mean())**2)
     split = int(np.searchsorted(energy, _LEARN * energy[-1]))
     rest = slice(split, None)
     if len(pair) - split < 256 or split < 256:
         return float("nan")
     try:
-        learnt = fit_oscillator(reference[:split], sensor[:split], pair.sampling_rate_hz,
-                                pair.valid[:split], pair.lag_s)
-    except IdentificationError:
+        learnt = data.fit(structure, slice(split), start=fit.unknowns)
+        # the pair's lag belongs to the stamps, not to the sensor
+        model = SensorModel(structure.core(learnt), [TimeDelay(learnt["delay_s"] - pair.lag_s),
+                                                     Offset(learnt["offset"])])
+    except FracAccelError:
         return float("nan")
-    core = Oscillator(natural_frequency_hz=learnt.values[1], damping_ratio=learnt.values[2],
-                      sensitivity=learnt.values[0])
-    model = SensorModel(core, [TimeDelay(learnt.values[3] - pair.lag_s), Offset(learnt.values[4])])
     # simulated over the whole record, so that the held-out part begins with its true history
-    simulated = simulate(model, reference, pair.sampling_rate_hz, axis="x", initial="steady")
-    error = (sensor - simulated)[rest][pair.valid[rest]]
-    spread = np.std(sensor[rest][pair.valid[rest]])
+    simulated = simulate(model, data.reference, pair.sampling_rate_hz, axis="x", initial="steady")
+    error = (data.sensor - simulated)[rest][pair.valid[rest]]
+    spread = np.std(data.sensor[rest][pair.valid[rest]])
     return float(np.sqrt(np.mean(error**2)) / spread) if spread > 0 else float("nan")
 
 
-def _notes(parameters, nrmse, held_out, pair, fit, highest):
+def _notes(parameters, chosen, data, highest):
+    fit, pair, nrmse, held_out = chosen.fit, data.pair, chosen.nrmse, chosen.held_out_nrmse
     notes = []
-    for name in ("sensitivity", "natural_frequency_hz", "damping_ratio"):
+    for name in ("sensitivity", *chosen.structure.names):
         entry = parameters[name]
         if entry["std"] > _UNDETERMINED * abs(entry["value"]):
             share = entry["std"] / abs(entry["value"])

@@ -1,0 +1,59 @@
+"""Averaged frequency response of a measured pair: where the search for parameters starts."""
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+
+_SEGMENTS = 4
+_MOST_BINS = 200
+
+
+def bulk_delay(reference, sensor):
+    """Whole samples by which the sensor is later than the reference: the correlation's peak."""
+    n = len(reference)
+    length = next_fast_len(2 * n, real=True)
+    shared = irfft(np.conj(rfft(reference - reference.mean(), length))
+                   * rfft(sensor - sensor.mean(), length), length)
+    lags = np.r_[0:n // 4, -(n // 4):0]
+    return int(lags[np.argmax(np.abs(shared[lags]))])
+
+
+def averaged_response(reference, sensor, sampling_rate_hz, delay):
+    """Response from reference to sensor, averaged over segments and neighbouring frequencies.
+
+    Parameters
+    ----------
+    reference, sensor : ndarray, shape (n,)
+    sampling_rate_hz : float
+    delay : int
+        Delay [samples] taken out first, so that the segments belong together.
+
+    Returns
+    -------
+    frequency_hz : ndarray, shape (m,)
+    response : ndarray of complex, shape (m,)
+        Of the sensor without `delay`.
+    weight : ndarray, shape (m,)
+        The reference's power: the least-squares weight of the response.
+    """
+    n = len(reference) - abs(delay)
+    x = reference[max(-delay, 0):][:n]
+    y = sensor[max(delay, 0):][:n]
+    size = next_fast_len(min(n, max(256, n // _SEGMENTS)), real=True)
+    size = min(size, n)
+    starts = np.arange(0, n - size + 1, max(size // 2, 1))
+    window = np.hanning(size)
+    place = starts[:, None] + np.arange(size)
+    spectra = [rfft((v[place] - v.mean()) * window, axis=1) for v in (x, y)]
+    power = np.sum(np.abs(spectra[0])**2, axis=0)
+    cross = np.sum(np.conj(spectra[0]) * spectra[1], axis=0)
+    frequency = np.fft.rfftfreq(size, 1 / sampling_rate_hz)
+    strong = np.flatnonzero(power > 1e-6 * power.max())
+    strong = strong[strong > 0]
+    # neighbours are put together until few enough are left, each by its share of power
+    groups = min(len(strong), _MOST_BINS)
+    edges = np.unique(np.linspace(0, len(strong), groups + 1).astype(int))[:-1]
+
+    def gathered(values):
+        return np.add.reduceat(values[strong], edges)
+    weight = gathered(power)
+    return gathered(power * frequency) / weight, gathered(cross) / weight, weight

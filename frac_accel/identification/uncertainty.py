@@ -1,0 +1,45 @@
+"""Uncertainty of least-squares parameters when the residual is not white."""
+
+import numpy as np
+from scipy.fft import next_fast_len, rfft
+from scipy.ndimage import uniform_filter1d
+
+
+def sandwich(jacobian, residual, used):
+    r"""Covariance :math:`(J^T J)^{-1} J^T \Gamma J (J^T J)^{-1}`.
+
+    The residual's autocovariance :math:`\Gamma` comes from its smoothed spectrum (L. Ljung, *System
+    Identification*, 2nd ed., equation (9.42)).
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (m, p)
+    residual : ndarray, shape (m,)
+    used : ndarray of bool, shape (n,)
+        Where the m rows stand in the record.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+        Huge, not small, for what the data leave open.
+    """
+    scale = np.linalg.norm(jacobian, axis=0)
+    scaled = jacobian / scale
+    full = np.zeros((scaled.shape[1] + 1, len(used)))
+    full[:-1, used] = scaled.T
+    full[-1, used] = residual
+    length = next_fast_len(2 * len(used), real=True)
+    spectra = rfft(full, length, axis=1)
+    power = np.abs(spectra[-1])**2 / len(residual)
+    width = max(5, int(np.sqrt(len(power))))
+    smooth = uniform_filter1d(power, width, mode="reflect")
+    twice = np.full(len(power), 2.0)
+    twice[0] = 1.0
+    if length % 2 == 0:
+        twice[-1] = 1.0
+    columns = spectra[:-1]
+    meat = np.real((np.conj(columns) * (twice * smooth)) @ columns.T) / length
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    bread = (vectors / np.maximum(values, 1e-15 * values[-1])) @ vectors.T
+    freedom = len(residual) / max(len(residual) - jacobian.shape[1], 1)
+    return freedom * bread @ meat @ bread / np.outer(scale, scale)

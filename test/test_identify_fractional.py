@@ -1,0 +1,53 @@
+"""`identify` finds a fractional damping where there is one, and only there."""
+
+import numpy as np
+import pytest
+import rig
+
+from frac_accel import identify
+from frac_accel.pair import make_pair
+from frac_accel.samples import Samples
+
+RATE_HZ = 2000.0
+
+
+def measured(rng, kind, snr_db, **draw):
+    sensor = rig.draw_sensor(rng, RATE_HZ, kind, ["time_delay"], **draw)
+    excitation = rig.band_noise(rng, RATE_HZ, 5.0, (5.0, 700.0), (1.0, 0.0, 0.0), lead_s=1.0)
+    record = rig.simulate_record(sensor, excitation, rng, snr_db=snr_db)
+    return sensor.core, make_pair(Samples.of(record.stamps_ns, record.reference),
+                                  Samples.of(record.sensor_stamps_ns, record.sensor))
+
+
+def test_order_is_found_and_covered():
+    rng = np.random.default_rng(30261)
+    scores, errors = [], []
+    for _ in range(12):
+        core, pair = measured(rng, "fractional", 40.0)
+        result = identify(pair, structure="fractional")
+        names = ("natural_frequency_hz", "damping_ratio", "damping_order", "sensitivity")
+        scores.append([(result.parameters[name]["value"] - core[name])
+                       / result.parameters[name]["std"] for name in names])
+        errors.append(abs(result.parameters["damping_order"]["value"] - core["damping_order"]))
+    assert np.median(errors) < 0.01
+    # 48 correlated trials of 0.95
+    assert np.mean(np.abs(scores) < 1.96) > 0.8
+
+
+@pytest.mark.parametrize("snr_db", [20.0, 40.0])
+def test_classical_sensor_stays_classical(snr_db):
+    rng = np.random.default_rng(30262)
+    for _ in range(6):
+        _, pair = measured(rng, "classical", snr_db)
+        result = identify(pair)
+        assert result.structure == "oscillator"
+        assert "not significant" in result.reason or "not predict better" in result.reason
+
+
+def test_fractional_sensor_is_found():
+    rng = np.random.default_rng(30263)
+    for low, high in [(0.4, 0.9), (1.1, 1.6)] * 3:
+        core, pair = measured(rng, "fractional", 40.0, damping_order=(low, high))
+        result = identify(pair)
+        assert result.structure == "fractional", core
+        assert result.model.core.damping_order == pytest.approx(core["damping_order"], abs=0.1)
