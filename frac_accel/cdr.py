@@ -289,7 +289,7 @@ def restamped(message: bytes, stamp_ns: int) -> bytes:
 
 
 def read_point_cloud(message: bytes) -> Samples:
-    """A block of samples: FLOAT64 fields ``t`` (s after the header's stamp), ``x``, ``y``, ``z``."""
+    """A block of samples: FLOAT64 fields ``t`` (s after the header's stamp), ``x, y, z``."""
     header = read_header(message)
     cursor = _Cursor(message, header)
     height, width = cursor.uint32(), cursor.uint32()
@@ -306,7 +306,7 @@ def read_point_cloud(message: bytes) -> Samples:
     for name in "txyz":
         offset, datatype = fields.get(name, (None, None))
         if offset is None:
-            raise BagError(f"PointCloud2 has no field '{name}'; it has {', '.join(fields) or 'none'}")
+            raise BagError(f"PointCloud2 has no field '{name}', only: {', '.join(fields) or '-'}")
         if datatype != _FLOAT64 or offset + 8 > point_step:
             raise BagError(f"PointCloud2 field '{name}' is not a FLOAT64 within the point")
     if point_step * width > len(data):

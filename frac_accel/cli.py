@@ -4,7 +4,10 @@ import argparse
 import importlib
 import sys
 
+from . import one_thread
 from .errors import FracAccelError
+
+one_thread.prefer()
 
 # Order of the help: the way through the work.
 VERBS = {

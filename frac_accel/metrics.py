@@ -20,7 +20,8 @@ class BandError:
     ----------
     band_hz : tuple of float
     amplitude_error : float
-        Gain from reference to signal, less 1; the gain is that of least squares over the band.
+        RMS of the signal over that of the reference, less 1, both within the band. A delay within
+        the band does not change it; noise of one percent of the signal adds 5e-5.
     phase_error_deg : float
         Mean phase of the signal against the reference [degree], weighted by power.
     nrmse : float
@@ -162,7 +163,8 @@ def interpolate(stamps_ns, values, at_ns, sampling_rate_hz):
     offset = position - nearest
     place = np.searchsorted(slot, nearest)
     found = (place < len(slot)) & (slot[np.minimum(place, len(slot) - 1)] == nearest)
-    own = found & (np.abs(offset) < 1e-3)
+    # a nanosecond is what rounding of the stamps may take away
+    own = found & (np.abs(at_ns - stamps_ns[np.minimum(place, len(slot) - 1)]) <= 1)
     result[own] = values[place[own]]
     reach = np.arange(-_HALF_WIDTH, _HALF_WIDTH + 1)
     inside = (found & ~own & (place >= _HALF_WIDTH) & (place < len(slot) - _HALF_WIDTH))

@@ -234,8 +234,9 @@ class SensorModel:
         try:
             with open(path, encoding="utf-8") as file:
                 text = file.read(_LARGEST_FILE + 1)
-        except (OSError, UnicodeDecodeError) as error:
-            reason = getattr(error, "strerror", None) or "not a text file"
+        except (OSError, ValueError) as error:
+            reason = ("not a text file" if isinstance(error, UnicodeDecodeError)
+                      else getattr(error, "strerror", None) or error)
             raise ModelError(f"{path}: cannot read the model: {reason}") from None
         if len(text) > _LARGEST_FILE:
             raise ModelError(f"{path}: larger than {_LARGEST_FILE // 1_000_000} MB, "
@@ -253,6 +254,7 @@ class SensorModel:
         """Write the model as YAML; the file is complete or not there."""
         path = Path(path)
         text = yaml.safe_dump(self.to_dict(), sort_keys=False, allow_unicode=True)
+        temporary = None
         try:
             handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
             with open(handle, "w", encoding="utf-8") as file:
@@ -263,6 +265,8 @@ class SensorModel:
             os.chmod(temporary, 0o666 & ~umask)
             os.replace(temporary, path)
         except OSError as error:
+            if temporary:
+                os.unlink(temporary)
             raise ModelError(f"{path}: cannot write the model: {error.strerror}") from None
 
 
@@ -279,10 +283,13 @@ class _Loader(yaml.SafeLoader):
     def construct_mapping(self, node, deep=False):
         seen = set()
         for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise yaml.constructor.ConstructorError(None, None, "a key that is not plain text",
+                                                        key.start_mark)
             if key.value in seen:
                 raise yaml.constructor.ConstructorError(
                     None, None, f"the key {key.value!r} stands twice", key.start_mark)
-            seen.add(key.value if isinstance(key.value, str) else str(key.value))
+            seen.add(key.value)
         return super().construct_mapping(node, deep)
 
 
@@ -324,7 +331,7 @@ def _require_band(band):
 def _core(entry, where):
     entry = dict(_require_mapping(entry, where))
     kind = entry.pop("type", "oscillator")
-    if kind not in CORES:
+    if not isinstance(kind, str) or kind not in CORES:
         raise ModelError(f"{where}.type: {kind!r} given, expected one of {', '.join(CORES)}")
     try:
         return build(CORES[kind], entry, where)
@@ -346,7 +353,7 @@ def _effects(entries, where):
         entry = dict(_require_mapping(entry, place))
         cause = entry.pop("cause", None)
         known = known_effects()
-        if cause not in known:
+        if not isinstance(cause, str) or cause not in known:
             close = difflib.get_close_matches(str(cause), known, n=1)
             hint = f"; did you mean {close[0]!r}?" if close else ""
             raise ModelError(f"{place}.cause: unknown cause {cause!r}, expected one of "

@@ -97,7 +97,7 @@ def number(value, where, expected="a number"):
     if isinstance(value, (int, float, str)) and not isinstance(value, bool):
         try:
             result = float(value)
-        except ValueError:
+        except (ValueError, OverflowError):
             result = math.nan
         if math.isfinite(result):
             return result

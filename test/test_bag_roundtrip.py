@@ -222,7 +222,8 @@ def test_memory_does_not_grow_with_the_bag(tmp_path):
     assert total > 55 * 2**20
     tracemalloc.start()
     reader = BagReader(path)
-    assert sum(len(samples.stamps_ns) for _, samples in reader.samples(["/imu/data_raw"])) == 180_000
+    blocks = reader.samples(["/imu/data_raw"])
+    assert sum(len(samples.stamps_ns) for _, samples in blocks) == 180_000
     assert sum(1 for _ in reader.messages()) == 180_000
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()

@@ -103,7 +103,9 @@ def write_bag(path: str | Path, topics: Mapping[str, Samples]) -> None:
             writer.add_topic(name, cdr.IMU)
         if not names:
             return
-        messages = [message for name in names for message in cdr.encode_samples(cdr.IMU, topics[name])]
+        messages: list[bytes] = []
+        for name in names:
+            messages += cdr.encode_samples(cdr.IMU, topics[name])
         all_numbers, all_times = np.concatenate(numbers), np.concatenate(log_times)
         order = np.argsort(all_times, kind="stable")
         for i, number, time_ns in zip(

@@ -103,10 +103,10 @@ class McapFile:
         try:
             with open(path, "rb") as stream:
                 self._scan(stream.fileno())
+            if self.counts is None or (not self.channels and self.segments):
+                self._count_by_reading()
         except OSError as error:
             raise BagError(f"{path}: cannot be read: {error.strerror}") from None
-        if self.counts is None or (not self.channels and self.segments):
-            self._count_by_reading()
 
     def read(self, segment: Segment) -> Messages:
         """Messages of a segment in log order; `BagError` if it is damaged as a whole."""

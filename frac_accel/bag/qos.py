@@ -9,6 +9,7 @@ import yaml
 _RELIABILITY = {1: "reliable", 2: "best_effort"}
 _DURABILITY = {1: "transient_local", 2: "volatile"}
 _HISTORY = {1: "keep_last", 2: "keep_all"}
+MAX_DEPTH = 1_000_000
 # rmw's "infinite" duration, int64 max in nanoseconds.
 _INFINITE = {"sec": 9223372036, "nsec": 854775807}
 
@@ -31,7 +32,7 @@ def parse_qos(text: str) -> tuple[Qos, ...]:
                 _word(entry.get("reliability"), _RELIABILITY, "reliable"),
                 _word(entry.get("durability"), _DURABILITY, "volatile"),
                 _word(entry.get("history"), _HISTORY, "keep_last"),
-                min(max(int(entry.get("depth", 10)), 1), 2**31 - 1),
+                min(max(int(entry.get("depth", 10)), 1), MAX_DEPTH),
             )
             for entry in entries or ()
         )

@@ -328,7 +328,7 @@ class _WantedChannels:
 
     def __init__(self, names: list[str]) -> None:
         self._names = {name: number for number, name in enumerate(names)}
-        self.topics = {number: name for number, name in enumerate(names)}
+        self.topics = dict(enumerate(names))
 
     def numbers(self, file: McapFile, channel_ids: np.ndarray) -> tuple[np.ndarray, bool]:
         """Number of the topic of each message, and whether all channels are known."""

@@ -130,7 +130,7 @@ class _Sink:
             self._first += 1
             messages.append(message)
             logs.append(log)
-        patched = cdr.patch_samples(self._type, messages, ready.stamps_ns, ready.values,
+        patched = cdr.replace_samples(self._type, messages, ready.stamps_ns, ready.values,
                                     ready.variance)
         for message, log in zip(patched, logs):
             self._writer.write(self._topic, message, log)

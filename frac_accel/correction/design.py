@@ -18,8 +18,8 @@ NYQUIST_SHARE = 0.6
 TOLERANCE = 2e-3
 # Without a permitted delay: the shortest whose noise gain is this close to that of a brick wall.
 NOISE_EXCESS = 1.3
-# Lowest frequency [of the sampling rate] down to which fractional memory is modelled.
-LOWEST_SHARE = 1e-6
+# Lowest frequency [of the sampling rate] that is told from zero: at 2 kHz a period of six days.
+LOWEST_SHARE = 1e-9
 # Below the band of a sensor with a high-pass: gain, as a multiple of that at the band's edge, at
 # which the rise weighs as much as the permitted error does in the band.
 MOST_RISE = 30
@@ -29,6 +29,8 @@ TAIL = 4
 # Delay, in periods of the highest frequency or of its distance from the Nyquist frequency, beyond
 # which a filter gains nothing.
 _LONGEST = 8
+# Relative change of a response from that at zero that is none.
+STATIC = 5e-4
 _MOST_TAPS = 4096
 
 
@@ -145,12 +147,15 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
     ------
     DesignError
         If it cannot be met; the message says what can.
+    ModelError
+        If the cross-axis terms cannot be inverted.
     """
     rate = _positive(sampling_rate_hz, "sampling_rate_hz")
     for name, value in (("bandwidth_hz", bandwidth_hz), ("max_delay_s", max_delay_s),
                         ("lowest_hz", lowest_hz), ("tolerance", tolerance)):
         if value is not None:
             _positive(value, name)
+    model.remove_sample_effects(np.zeros((1, 3)))  # refuses those that cannot be undone
     bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz)
              for name, axis in zip(AXES, model.axes)]
     # stamps are whole nanoseconds; what is left of the delay is done by the filters
@@ -177,7 +182,8 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
     model : SensorModel
     sampling_rate_hz : float
     tolerance : float
-        Permitted worst relative error up to 0.6 of the Nyquist frequency.
+        Permitted worst error of the complex response up to 0.6 of the Nyquist frequency, relative
+        to its size, or to a hundredth of the sensor's plateau where it is smaller than that.
 
     Returns
     -------
@@ -196,7 +202,8 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
     @functools.cache
     def problem(axis):
         return _Problem(axis.transfer_function, axis.poles(), rate,
-                        (0.0, NYQUIST_SHARE * rate / 2), axis.delay_s * rate + wait)
+                        (0.0, NYQUIST_SHARE * rate / 2), axis.delay_s * rate + wait,
+                        floor=0.01 * reference_gain(axis))
 
     problems = [problem(axis) for axis in model.axes]
     delay = _choose_delay(list(dict.fromkeys(problems)), rate, None, tolerance)
@@ -217,15 +224,20 @@ class _Problem:
     rate, band : float, tuple
     extra_delay : float
         Delay [samples] that this axis's target has beyond the common one.
+    floor : float
+        Size of the target below which errors are relative to it.
     """
 
-    def __init__(self, target, poles_s, rate, band, extra_delay):
+    def __init__(self, target, poles_s, rate, band, extra_delay, floor=0.0):
         self.rate, self.band = rate, band
         self.lead = int(extra_delay)
         self.extra_delay = extra_delay - self.lead
         low, high = band
         self.poles_s = poles_s
-        self.grid = _band_grid(band, rate, poles_s)
+        self.response, self.floor = target, floor
+        self.longest = min(_MOST_TAPS // 2,
+                           int(np.ceil(_LONGEST * rate / min(high, rate / 2 - high))))
+        self.grid = _band_grid(band, rate, poles_s, self.longest)
         self.check = _refined(self.grid)
         self.target = _evaluate(target, self.grid, rate)
         self.check_target = _evaluate(target, self.check, rate)
@@ -237,7 +249,6 @@ class _Problem:
         # root mean square over all frequencies: with it the noise gain is a fraction of this
         self.scale = np.sqrt(np.mean(np.abs(self.target)**2))
         self.outside_weight = np.sqrt(spacing / (rate / 2)) / self.scale
-        self.longest = min(_MOST_TAPS // 2, int(np.ceil(_LONGEST * rate / min(high, rate / 2 - high))))
         linear = np.linspace(low, high, 2000)
         gain = np.abs(_evaluate(target, linear, rate))
         self.ideal_noise_gain = np.sqrt(np.mean(gain**2) * (high - low) / (rate / 2))
@@ -260,12 +271,13 @@ class _Problem:
         low = self.band[0]
         shift = delay + self.extra_delay
         inside = self._columns(self.grid, taps, poles)
-        inside *= (np.exp(2j * np.pi * self.grid * shift / self.rate) / self.target)[:, None]
+        inside *= (np.exp(2j * np.pi * self.grid * shift / self.rate)
+                   / self._unit(self.target))[:, None]
         # the fit is worst where a high-pass's band begins: there an error weighs more
         weight = np.sqrt((1 + 4 * (low / np.maximum(self.grid, 1e-300))**2) / len(self.grid))
         inside *= weight[:, None]
         outside = self._columns(self.outside, taps, poles) * self.outside_weight[:, None]
-        wanted = weight
+        wanted = weight * np.abs(self.target / self._unit(self.target))
         if low:
             # below a high-pass's band the inverse may rise, but not without end
             below = np.linspace(0, low, 20)
@@ -277,7 +289,9 @@ class _Problem:
         right = basis.T @ np.r_[wanted, np.zeros(len(wanted))]
         noise = np.linalg.qr(_real(outside), mode="r")
         check = self._columns(self.check, taps, poles)
-        check *= (np.exp(2j * np.pi * self.check * shift / self.rate) / self.check_target)[:, None]
+        check *= (np.exp(2j * np.pi * self.check * shift / self.rate)
+                  / self._unit(self.check_target))[:, None]
+        right_size = np.abs(self.check_target / self._unit(self.check_target))
 
         def fit(noise_weight):
             matrix = np.r_[triangle, noise_weight * noise]
@@ -286,23 +300,28 @@ class _Problem:
                                        rcond=1e-13)[0] / scale
             return unknowns, check @ unknowns
 
-        quiet, loud = -5.0, 2.0
+        quiet, loud = -6.0, 2.0
         best, response = fit(10.0**quiet)
-        if np.max(np.abs(response - 1)) <= tolerance:
+        if np.max(np.abs(response - right_size)) <= tolerance:
             while loud - quiet > 0.1:
                 middle = (quiet + loud) / 2
                 unknowns, trial = fit(10.0**middle)
-                if np.max(np.abs(trial - 1)) <= tolerance:
+                if np.max(np.abs(trial - right_size)) <= tolerance:
                     quiet, best, response = middle, unknowns, trial
                 else:
                     loud = middle
         result = self._filter(best, taps, poles)
+        phase = np.angle(response)
         return DesignedFilter(
             filter=result, sampling_rate_hz=self.rate, band_hz=self.band,
             delay_s=(shift + self.lead) / self.rate,
-            amplitude_error=float(np.max(np.abs(np.abs(response) - 1))),
-            phase_error_deg=float(np.degrees(np.max(np.abs(np.angle(response))))),
+            amplitude_error=float(np.max(np.abs(np.abs(response) - right_size))),
+            phase_error_deg=float(np.degrees(np.max(np.abs(phase[right_size > 0.999])))),
             noise_gain=result.noise_gain)
+
+    def _unit(self, target):
+        """What errors are relative to: the target, made no smaller than the floor."""
+        return target * np.maximum(1.0, self.floor / np.abs(target))
 
     def _structure(self, delay):
         """Basis of the taps, and the poles in z."""
@@ -313,15 +332,30 @@ class _Problem:
         taps = _SmoothTaps.of_length(max(count, 4), step)
         # decays that the taps alone would cut off too early
         memory = min(5 * self.rate / (np.pi * taps.length), 0.15 * self.rate)
-        poles_s = [p for p in self.poles_s if p.real < 0 and abs(p) < 0.4 * 2 * np.pi * self.rate
-                   and (p.imag or abs(p) > 2 * np.pi * memory / 10)]
-        lowest = low / 20 if low else LOWEST_SHARE * self.rate / 10
-        slow = [] if not self._has_memory() or lowest >= memory else -2 * np.pi * np.geomspace(
-            lowest, memory, 2 * int(np.ceil(1.25 * np.log10(memory / lowest))))
+        poles_s = [p for p in self.poles_s if p.real < 0 and abs(p) < np.pi * self.rate]
+        lowest = low / 20 if low else self._slowest() / 10
         real = [p.real for p in poles_s if not p.imag]
+        slow = []
+        if self._has_memory() and lowest < memory:
+            # evenly in log frequency around the slowest real pole: the memory's density has a
+            # pole there, too, and is summed rightly only if the two sides are alike
+            centre = -max(real, default=-2 * np.pi * memory) / (2 * np.pi)
+            steps = np.arange(np.floor(2.5 * np.log10(lowest / centre)),
+                              np.ceil(2.5 * np.log10(memory / centre)) + 1)
+            slow = -2 * np.pi * centre * 10**(steps[(steps != 0) | (not real)] / 2.5)
         pairs = [q for p in poles_s if p.imag > 0 for q in (p, np.conj(p))]
-        # pairs first: a section takes two poles, so an odd real one stands alone at the end
-        return taps, np.exp(np.r_[pairs, np.sort(np.r_[real, slow])].astype(complex) / self.rate)
+        # A section takes two poles: the conjugate pairs, then the slowest with the fastest (of two
+        # slow ones, rounding would spoil the product of 1 - p), an odd one at the end.
+        real = np.sort(np.r_[real, slow])
+        order = np.stack([np.arange(len(real)), np.arange(len(real))[::-1]], axis=1).ravel()
+        return taps, np.exp(np.r_[pairs, real[order[:len(real)]]].astype(complex) / self.rate)
+
+    def _slowest(self):
+        """Frequency [Hz] below which the target is as at zero."""
+        frequency = np.geomspace(LOWEST_SHARE * self.rate, self.band[1], 500)
+        target = _evaluate(self.response, np.r_[0, frequency], self.rate)
+        change = np.abs(target[1:] - target[0]) / max(np.abs(target[0]), self.floor)
+        return frequency[np.argmax(change > STATIC)]
 
     def _has_memory(self):
         """Whether the target still varies at frequencies that the taps cannot resolve."""
@@ -357,8 +391,8 @@ class _Problem:
                 numerator = scale * (next(rest) + next(rest) / pole)
                 residue = numerator * pole / (pole - np.conj(pole))
                 residues += [residue, np.conj(residue)]
-        return ParallelFilter(taps.taps(unknowns[:taps.unknowns]), poles, np.array(residues, complex),
-                              self.lead)
+        return ParallelFilter(taps.taps(unknowns[:taps.unknowns]), poles,
+                              np.array(residues, complex), self.lead)
 
 
 def _choose_delay(problems, rate, max_delay_s, tolerance):
@@ -409,7 +443,8 @@ def _cannot(problems, rate, max_delay_s, tolerance, smallest, longest):
     while possible < 0.5:
         possible = float(_rounded_up(possible, 2))
         if _worst([problem.solve(longest, possible) for problem in problems]) <= possible:
-            return f"{what} cannot be met, only with tolerance={possible:g} or in a smaller bandwidth"
+            return (f"{what} cannot be met, only with tolerance={possible:g} or in a smaller "
+                    "bandwidth")
         possible *= 1.2
     return f"{what} cannot be met at all; ask for a smaller bandwidth"
 
@@ -456,8 +491,8 @@ class _SmoothTaps:
 
 
 def _positive(value, name):
-    if not np.isfinite(value) or value <= 0:
-        raise FracAccelError(f"{name}: {value} given, expected a number above 0")
+    if not isinstance(value, (int, float, np.number)) or not np.isfinite(value) or value <= 0:
+        raise FracAccelError(f"{name}: {value!r} given, expected a number above 0")
     return float(value)
 
 
@@ -469,15 +504,15 @@ def _band(axis, name, rate, bandwidth_hz, lowest_hz):
     reference = reference_gain(axis)
     if not reference > 0:
         raise DesignError(f"axis {name}: the model's gain is zero, there is nothing to invert")
-    grid = np.geomspace(1e-4 * LOWEST_SHARE * rate, NYQUIST_SHARE * top, 8000)
+    grid = np.geomspace(0.1 * LOWEST_SHARE * rate, NYQUIST_SHARE * top, 8000)
     usable = np.abs(_evaluate(axis.transfer_function, grid, rate)) >= GAIN_AT_BAND_EDGE * reference
     if bandwidth_hz is not None and bandwidth_hz >= 0.95 * top:
         raise DesignError(f"bandwidth_hz: {bandwidth_hz:g} given, expected below {0.95 * top:g} "
                           f"(0.95 of the Nyquist frequency)")
     if not usable.any():
-        raise DesignError(f"axis {name}: nowhere up to {NYQUIST_SHARE * top:.4g} Hz does the sensor "
-                          f"keep {GAIN_AT_BAND_EDGE:.0%} of its gain; a higher sampling rate is "
-                          "needed")
+        raise DesignError(f"axis {name}: nowhere up to {NYQUIST_SHARE * top:.4g} Hz does the "
+                          f"sensor keep {GAIN_AT_BAND_EDGE:.0%} of its gain; "
+                          "a higher sampling rate is needed")
     first = int(np.argmax(usable))
     after = np.flatnonzero(~usable[first:])
     last = first + (int(after[0]) if len(after) else len(grid) - first) - 1
@@ -495,9 +530,11 @@ def reference_gain(axis):
     return float(np.prod([link.reference_gain() for link in links]))
 
 
-def _band_grid(band, rate, poles_s):
+def _band_grid(band, rate, poles_s, delay):
     low, high = band
-    grid = [np.linspace(low, high, 300), np.geomspace(max(low, LOWEST_SHARE * rate), high, 150)]
+    # four points for each ripple that the taps can make
+    grid = [np.linspace(low, high, max(300, int(8 * delay * high / rate))),
+            np.geomspace(max(low, LOWEST_SHARE * rate), high, 200)]
     for pole in poles_s:
         centre, width = abs(pole.imag) / (2 * np.pi), abs(pole.real) / (2 * np.pi)
         if width < 0.1 * centre:
@@ -515,7 +552,7 @@ def _refined(grid):
 
 def _evaluate(target, frequency, rate):
     """Target on a grid of frequencies [Hz]; at zero, its limit."""
-    return target(2j * np.pi * np.maximum(frequency, 1e-9 * LOWEST_SHARE * rate))
+    return target(2j * np.pi * np.maximum(frequency, 1e-6 * LOWEST_SHARE * rate))
 
 
 def _real(matrix):

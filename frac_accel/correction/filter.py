@@ -47,10 +47,18 @@ class ParallelFilter:
         The square root of the sum of the squared impulse response, in closed form: the slow poles
         would need millions of terms.
         """
+        later = self.residues * self.poles**len(self.taps)
+        tail = np.outer(later, later) / (1 - np.outer(self.poles, self.poles))
+        return float(np.sqrt(np.sum(self.impulse_head**2) + max(tail.sum().real, 0.0)))
+
+    @property
+    def impulse_head(self):
+        """Impulse response after the lead, as far as the taps reach.
+
+        Taps and recursion may cancel each other there, so neither alone says how loud the noise is.
+        """
         powers = self.poles[:, None] ** np.arange(len(self.taps))
-        cross = 2 * (self.residues[:, None] * powers * self.taps).sum()
-        tail = np.outer(self.residues, self.residues) / (1 - np.outer(self.poles, self.poles))
-        return float(np.sqrt(max(np.sum(self.taps**2) + (cross + tail.sum()).real, 0.0)))
+        return self.taps + (self.residues[:, None] * powers).sum(axis=0).real
 
     def unknown_history(self, count):
         """Weight of what came before the filter's start, `count` samples ago (array).

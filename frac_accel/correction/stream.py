@@ -127,6 +127,9 @@ class Stream:
         if variance is None:
             variance = np.full(values.shape, np.nan)
         variance = np.asarray(variance, float)
+        if variance.shape != values.shape:
+            raise FracAccelError(f"variance: shape {variance.shape} given, expected "
+                                 f"{values.shape}")
         index = np.arange(self._samples, self._samples + len(stamps))
         self._samples += len(stamps)
         if self._clock is None:
@@ -201,14 +204,15 @@ class Stream:
         return values
 
     def _estimate(self, least):
-        """Start at the rate of the held stamps, if there are enough of them."""
+        """Start at the rate of the first stamps, if there are enough of them.
+
+        Which stamps these are must not depend on the blocks in which they come.
+        """
         stamps = np.concatenate([block[1] for block in self._held])
-        if len(stamps) < least:
+        advancing = np.flatnonzero(np.diff(stamps) > 0)
+        if not advancing.size or len(stamps) < least:
             return False
-        rate = estimate_rate(stamps)
-        if rate is None:
-            return False
-        self._start(rate)
+        self._start(estimate_rate(stamps[:max(RATE_SAMPLES, advancing[0] + 2)]))
         return True
 
     def _start(self, rate):
@@ -287,7 +291,8 @@ class Stream:
             level = 0.0 if design.band_hz[0] else column.mean()
             state = FilterState(design.filter, level)
             state.process(column)
-            noise = np.square(design.filter.taps), np.array([1.0, 0.0])
+            head = np.square(design.filter.impulse_head)
+            noise = np.r_[np.zeros(design.filter.lead), head], np.array([1.0, 0.0])
             initial = np.zeros(max(len(noise[0]), 2) - 1)
             _, initial = lfilter(*noise, variance[:, axis], zi=initial)
             self._states.append((state, noise, initial, np.mean((column - level)**2)))
@@ -306,11 +311,11 @@ class Stream:
         for axis, design in enumerate(self.design.axes):
             state, noise, initial, power = self._states[axis]
             result[:, axis] = state.process(values[:, axis])
-            through_taps, initial = lfilter(*noise, variance[:, axis], zi=initial)
+            soon, initial = lfilter(*noise, variance[:, axis], zi=initial)
             self._states[axis] = state, noise, initial, power
-            through_poles = max(design.filter.noise_gain**2 - noise[0].sum(), 0.0)
+            later = max(design.noise_gain**2 - noise[0].sum(), 0.0)
             history = power * design.filter.unknown_history(since)**2
-            spread[:, axis] = through_taps + through_poles * variance[:, axis] + history
+            spread[:, axis] = soon + later * variance[:, axis] + history
         self._since_start += count
         index, stamps = self._waiting_index[:count], self._waiting_stamps[:count]
         self._waiting_index = self._waiting_index[count:]

@@ -9,6 +9,7 @@ import importlib
 import pkgutil
 from importlib.metadata import entry_points
 
+from ..errors import FracAccelError
 from .base import Effect
 
 __all__ = ["Effect", "known_effects"]
@@ -21,5 +22,13 @@ def known_effects():
         importlib.import_module(f"{__name__}.{module.name}")
     ours = {effect.cause: effect for effect in Effect.__subclasses__()
             if effect.__module__.startswith(f"{__name__}.")}
-    extensions = (entry.load() for entry in entry_points(group="frac_accel.effects"))
+    extensions = [_load(entry) for entry in entry_points(group="frac_accel.effects")]
     return {**{effect.cause: effect for effect in extensions}, **ours}
+
+
+def _load(entry):
+    try:
+        return entry.load()
+    except Exception as error:
+        raise FracAccelError(f"the installed extension {entry.name} ({entry.value}) cannot be "
+                             f"loaded: {error}") from error

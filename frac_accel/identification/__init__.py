@@ -238,7 +238,7 @@ def _notes(parameters, chosen, data, highest):
     noise = _noise(fit.residual)
     if nrmse > 1e-3 and fit.rmse > 3 * noise:
         notes.append(f"the model leaves {nrmse:.2%} of the output unexplained, while its white "
-                     f"noise is {noise / (fit.rmse / nrmse):.2%}: something real is missing from it")
+                     f"noise is {noise / data.spread:.2%}: something real is missing from it")
     if np.isfinite(held_out) and held_out > max(2 * nrmse, 1e-3):
         notes.append(f"held-out data are predicted worse ({held_out:.2%}) than the fitted "
                      f"({nrmse:.2%})")

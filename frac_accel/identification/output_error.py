@@ -150,7 +150,8 @@ class _Problem:
         frequency, response, weight = averaged_response(self.reference, self.whole, self.rate, bulk)
         s = 2j * np.pi * frequency
         prepared = self.structure.prepare(s)
-        grid = self.structure.grid(frequency[0], frequency[-1])
+        peak = frequency[np.argmax(np.abs(response))]
+        grid = self.structure.grid(frequency[0], frequency[-1], peak)
         models = np.stack([self.structure.gradient(prepared, point)[0] for point in grid])
         # the correlation may have peaked half a period of the resonance away from the delay
         energy = weight * np.abs(response)**2
@@ -165,13 +166,19 @@ class _Problem:
         for flat in np.argsort(explained, axis=None)[::-1]:
             point, delay = divmod(int(flat), len(delays))
             # neighbours in frequency end in the same place; other dampings may not
-            kind = *np.round(grid[point][1:], 3), round(grid[point][0])
+            kind = *np.round(grid[point][1:], 3), round(grid[point][0], 1)
             group = seen.setdefault(tuple(grid[point][held]), set())
             if kind not in group and len(group) < self.structure.starting_points:
                 group.add(kind)
                 chosen.append(np.r_[grid[point], delays[delay]])
-        improved = sorted((self.improve(theta, s, prepared, response, np.sqrt(weight))
-                           for theta in chosen), key=lambda pair: pair[0])
+        improved = [self.improve(theta, s, prepared, response, np.sqrt(weight))
+                    for theta in chosen]
+        # half a period of the resonance, with the other polarity, looks much the same
+        best = min(improved, key=lambda pair: pair[0])[1]
+        half = np.r_[np.zeros(len(best) - 1), self.rate / (2 * peak)]
+        improved += [self.improve(theta, s, prepared, response, np.sqrt(weight))
+                     for theta in (best - half, best + half)]
+        improved.sort(key=lambda pair: pair[0])
         lag = bulk + self.lag_s * self.rate
         best = {}
         for _, theta in improved:

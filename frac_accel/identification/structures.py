@@ -38,9 +38,10 @@ class OscillatorStructure:
         """Lowest and highest unknowns for a record of n samples."""
         return [np.log(rate / n), np.log(1e-4)], [np.log(50 * rate), np.log(20)]
 
-    def grid(self, low_hz, high_hz):
-        """Unknowns to start from, shape (m, k)."""
-        frequency = np.log(np.geomspace(max(2 * low_hz, high_hz / 100), 3 * high_hz, _FREQUENCIES))
+    def grid(self, low_hz, high_hz, peak_hz):
+        """Unknowns to start from, shape (m, k); `peak_hz` is where the response is largest."""
+        frequency = np.log(np.r_[
+            np.geomspace(max(2 * low_hz, high_hz / 100), 3 * high_hz, _FREQUENCIES), peak_hz])
         return np.stack(np.meshgrid(frequency, np.log(_DAMPINGS)), axis=-1).reshape(-1, 2)
 
     def free_motions(self, theta, time):
@@ -88,8 +89,8 @@ class FractionalStructure(OscillatorStructure):
         low, high = super().bounds(rate, n)
         return [*low, 0.05], [*high, 1.95]
 
-    def grid(self, low_hz, high_hz):
-        classical = super().grid(low_hz, high_hz)
+    def grid(self, low_hz, high_hz, peak_hz):
+        classical = super().grid(low_hz, high_hz, peak_hz)
         return np.concatenate([np.c_[classical, np.full(len(classical), order)]
                                for order in _ORDERS])
 

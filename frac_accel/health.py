@@ -1,0 +1,203 @@
+"""What the state of a running correction means: a level, and a sentence that says what to do."""
+
+import dataclasses
+
+from .correction.timing import RATE_SAMPLES
+from .live_metrics import Findings
+
+OK, WARN, ERROR = range(3)
+
+# A topic is silent after this long without a message [s].
+SILENT_AFTER_S = 2.0
+# The stamps' rate may be off the stated one by this share.
+_RATE_SHARE = 0.05
+_BUSY = 0.9
+_DROPPED = {
+    "duplicates": "had the same stamp as the one before",
+    "stamps_back": "had a stamp before the one before",
+    "early": "came too early for the sampling rate",
+    "not_finite": "had a value that is not finite",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Publisher:
+    """A publisher on the raw topic.
+
+    Attributes
+    ----------
+    node : str
+    refusal : str
+        Why nothing can be received from it; empty if it can.
+    """
+
+    node: str
+    refusal: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Situation:
+    """What is known of one topic's correction over the last period.
+
+    Attributes
+    ----------
+    topic : str
+        The raw topic.
+    model_file : str
+        Empty without a model.
+    failure : str
+        Why there is no filter, if its design has failed.
+    designing : bool
+        Whether a filter is being designed and nothing can be corrected before it is there.
+    publishers : tuple of Publisher
+    seconds_since_message : float or None
+        None if there never was one.
+    stated_rate_hz : float
+        Parameter ``sample_rate_hz``; 0: to be estimated.
+    sample_rate_hz : float or None
+        Rate in use.
+    warm_up_samples : int or None
+        Samples that the filter needs before its first output.
+    counters, changes : dict of str to int
+        Counters, and what they have grown by in the last period. Besides those of `Stream`:
+        ``malformed``, ``lost``, ``without_model``.
+    load : float
+        Share of one core that the process uses.
+    findings : Findings
+    reference_silent_s : float or None
+        Time since the last reference message, where there was one.
+    """
+
+    topic: str
+    model_file: str = ""
+    failure: str = ""
+    designing: bool = False
+    publishers: tuple = ()
+    seconds_since_message: float | None = None
+    stated_rate_hz: float = 0.0
+    sample_rate_hz: float | None = None
+    warm_up_samples: int | None = None
+    counters: dict = dataclasses.field(default_factory=dict)
+    changes: dict = dataclasses.field(default_factory=dict)
+    load: float = 0.0
+    findings: Findings = dataclasses.field(default_factory=Findings)
+    reference_silent_s: float | None = None
+
+
+def judge(situation):
+    """Level and sentence for a situation.
+
+    Returns
+    -------
+    level : int
+        `OK`, `WARN` or `ERROR`.
+    message : str
+        Why nothing is being published, where nothing is; otherwise what is wrong, if anything.
+    """
+    reason = _silence(situation)
+    if reason:
+        return reason
+    troubles = _troubles(situation)
+    if troubles:
+        return WARN, "; ".join(troubles)
+    return OK, f"correcting at {situation.sample_rate_hz:.6g} Hz"
+
+
+def _silence(s):
+    """Level and reason why nothing comes out, or None if something does."""
+    if not s.model_file:
+        return ERROR, "no model: set the parameter model_file to a sensor model (YAML)"
+    if s.failure:
+        return ERROR, f"no filter: {s.failure}"
+    return _no_input(s) or _no_output(s)
+
+
+def _no_input(s):
+    if s.seconds_since_message is not None and s.seconds_since_message < SILENT_AFTER_S:
+        return None
+    if not s.publishers:
+        before = "" if s.seconds_since_message is None else " any more"
+        return WARN, (f"no publisher on {s.topic}{before}: start the sensor's driver, or remap the "
+                      "topic")
+    refused = [f"{p.node} {p.refusal}" for p in s.publishers if p.refusal]
+    if refused:
+        return ERROR, f"nothing can be received on {s.topic}: {'; '.join(refused)}"
+    names = ", ".join(p.node for p in s.publishers)
+    since = ("yet" if s.seconds_since_message is None
+             else f"for {s.seconds_since_message:.0f} s")
+    return WARN, f"no message on {s.topic} {since}, though {names} publishes there"
+
+
+def _no_output(s):
+    changes = s.changes
+    if changes.get("given"):
+        return None
+    received = changes.get("samples", 0)
+    if not received and changes.get("malformed"):
+        return ERROR, (f"all {changes['malformed']} messages of the last second could not be read "
+                       f"as the type of {s.topic}")
+    if s.designing:
+        return WARN, "the filter is being designed"
+    if s.sample_rate_hz is None:
+        return _no_rate(s)
+    dropped = {name: changes.get(name, 0) for name in _DROPPED}
+    if received and sum(dropped.values()) >= received:
+        causes = ", ".join(f"{count} {_DROPPED[name]}" for name, count in dropped.items() if count)
+        hint = ("; sample_rate_hz may be too low" if dropped["early"] else "")
+        return ERROR, f"all {received} samples of the last second were dropped: {causes}{hint}"
+    if changes.get("restarts", 0) > 1:
+        return ERROR, (f"the filter started anew {changes['restarts']} times in the last second "
+                       "because of gaps in the stamps: samples are lost, or sample_rate_hz is "
+                       "wrong" + _other_rate(s))
+    waiting = s.counters.get("waiting", 0)
+    return WARN, (f"the filter is warming up: {waiting} of {s.warm_up_samples} samples")
+
+
+def _no_rate(s):
+    waiting = s.counters.get("waiting", 0)
+    if waiting >= RATE_SAMPLES:
+        return ERROR, ("the sampling rate cannot be estimated: the stamps do not advance; let the "
+                       "driver stamp its messages")
+    return WARN, f"estimating the sampling rate: {waiting} of {RATE_SAMPLES} samples"
+
+
+def _troubles(s):
+    changes = s.changes
+    troubles = []
+    for name, text in _DROPPED.items():
+        if changes.get(name):
+            troubles.append(f"{changes[name]} samples {text} and were dropped")
+    if changes.get("gaps"):
+        troubles.append(f"{changes['gaps']} gaps were bridged over {changes.get('filled', 0)} "
+                        "samples")
+    if changes.get("restarts"):
+        troubles.append(f"the filter started anew {changes['restarts']} times after longer gaps")
+    if changes.get("malformed"):
+        troubles.append(f"{changes['malformed']} messages could not be read")
+    if changes.get("lost"):
+        troubles.append(f"{changes['lost']} messages were lost on the way: raise depth")
+    refused = [f"{p.node} {p.refusal}" for p in s.publishers if p.refusal]
+    if refused:
+        troubles.append(f"not received from another publisher: {'; '.join(refused)}")
+    if _other_rate(s):
+        troubles.append(f"sample_rate_hz is {s.stated_rate_hz:.6g}{_other_rate(s)}")
+    if s.findings.clipped_axes:
+        troubles.append(f"axis {', '.join(s.findings.clipped_axes)} seems to be clipped")
+    if s.findings.constant:
+        troubles.append("the raw signal does not change at all: is the sensor alive?")
+    if s.reference_silent_s is not None and s.reference_silent_s > SILENT_AFTER_S:
+        troubles.append(f"the reference is lost: no message for {s.reference_silent_s:.0f} s, so "
+                        "no errors are published")
+    elif s.findings.reference_overlaps is False:
+        troubles.append("reference and sensor have no time in common: compare their clocks")
+    if s.load > _BUSY:
+        troubles.append(f"the process uses {s.load:.0%} of a core")
+    return troubles
+
+
+def _other_rate(s):
+    """What the stamps say of a stated rate that they do not have."""
+    actual = s.findings.stamp_rate_hz
+    if not s.stated_rate_hz or not actual or abs(actual / s.stated_rate_hz - 1) < _RATE_SHARE:
+        return ""
+    return f", but the stamps advance at {actual:.6g} Hz"

@@ -1,0 +1,238 @@
+"""One topic through a filter to another: what `corrector` and `virtual_sensor` have in common."""
+
+import time
+
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+from frac_accel.errors import FracAccelError
+from frac_accel.nodes._runtime import INVALID_ENDPOINT, NodeError, RawSubscription
+
+# Filtering one sample costs as much as filtering fifty, so messages are taken in small groups:
+# for at most this share of the filter's own delay, and never longer than this.
+_GROUPING_SHARE = 0.25
+_LONGEST_GROUPING_S = 0.005
+_POLL_S = 0.001
+
+
+def raw_qos(depth):
+    """QoS for the topic of a sensor."""
+    return QoSProfile(depth=depth, reliability=qos_profile_sensor_data.reliability)
+
+
+class FilteredTopic:
+    """Subscription, filter and publisher.
+
+    Whatever takes long (the design of a filter) runs in the worker thread, while messages go on
+    being taken and, where there is a filter already, filtered.
+
+    Parameters
+    ----------
+    node : FracAccelNode
+    message_class : type
+        Of both topics.
+    topics : tuple of str
+        Input and output.
+    depth : int
+        Queue of both topics; the QoS can be overridden by parameters.
+    worker : concurrent.futures.ThreadPoolExecutor
+        With one thread.
+    make : callable
+        Returns new `SampleMessages` or `BlockMessages` for a model and the wishes for its filter;
+        raises FracAccelError.
+    is_optional : bool
+        Whether a filter is only made once there are messages.
+    on_processed : callable, optional
+        Called with each `Processed` after it has been published, and the time of that [ns].
+
+    Attributes
+    ----------
+    messages : SampleMessages, BlockMessages or None
+        None while there is no model.
+    failure : str
+        Why the last design failed; empty if it did not.
+    unfiltered : int
+        Messages that came while there was no filter to be had.
+    published : int
+    last_message_s : float or None
+        Monotonic time of the last message.
+    """
+
+    def __init__(self, node, message_class, topics, depth, worker, make, is_optional=False,
+                 on_processed=None):
+        self.messages = None
+        self.failure = ""
+        self.unfiltered = self.published = 0
+        self.last_message_s = None
+        self._node = node
+        self._worker = worker
+        self._make = make
+        self._is_optional = is_optional
+        self._offered = self._candidate = None
+        self._on_processed = on_processed
+        self._intake = []
+        self._task = None
+        self._hold = self._draining = False
+        self._next_s = 0.0
+        self._stream_counters = {}
+        self._wake = node.create_guard_condition(self._advance)
+        try:
+            self._publisher = node.create_publisher(
+                message_class, topics[1],
+                QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE),
+                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        except INVALID_ENDPOINT as error:
+            raise NodeError(f"topic {topics[1]} cannot be published: {error}") from None
+        self._subscription = RawSubscription(
+            node, message_class, topics[0], self._on_messages, raw_qos(depth))
+
+    @property
+    def name(self):
+        """Resolved name of the input topic."""
+        return self._subscription.subscription.topic_name
+
+    @property
+    def qos(self):
+        """QoS of the input topic."""
+        return self._subscription.subscription.qos_profile
+
+    @property
+    def stream(self):
+        """The `Stream`, or None."""
+        return self.messages.stream if self.messages else None
+
+    @property
+    def designing(self):
+        """Whether a filter is being made that nothing can be filtered without."""
+        return self._task is not None and self.messages is None
+
+    @property
+    def counters(self):
+        """Counters of the stream and of the messages, as a new dict of str to int."""
+        if self._settled:
+            self._stream_counters = {**self.stream.counters, "malformed": self.messages.malformed}
+        return {**self._stream_counters, "lost": self._subscription.lost,
+                "without_filter": self.unfiltered, "published": self.published}
+
+    @property
+    def _settled(self):
+        return self.messages is not None and self._task is None
+
+    def offer(self, model, wishes):
+        """Filter with this model as soon as there are messages."""
+        self._offered = model, wishes
+
+    def start(self):
+        """Make the filter for what has been offered now; raises FracAccelError."""
+        self.messages = self._make(*self._offered)
+
+    def prepare(self, model, wishes):
+        """Design another model's filter while this one goes on; raises FracAccelError."""
+        self._finish_task()
+        self._candidate = None
+        if self.messages is None and self._is_optional:
+            return
+        # the thread that designs has the stream for itself while its rate is still unknown
+        self._hold = self.messages is None or self.stream.sample_rate_hz is None
+        try:
+            make = self._make if self.messages is None else self.stream.prepare
+            design = self._worker.submit(make, model, wishes)
+            while not design.done():
+                self._subscription.drain()
+                time.sleep(_POLL_S)
+            self._candidate = design.result()
+        finally:
+            self._hold = False
+
+    def replace(self, model, wishes):
+        """Go on with the model that has been prepared."""
+        self._offered, self.failure = (model, wishes), ""
+        if self.messages is None:
+            self.messages = self._candidate
+        else:
+            self._publish(self.messages.replace(model, wishes))
+        self._advance()
+
+    def drain(self):
+        """Filter what is waiting."""
+        self._subscription.drain()
+        self._finish_task()
+
+    def _finish_task(self):
+        while self._task is not None:
+            if self._task.done():
+                self._collect()
+            else:
+                self._subscription.drain()
+                time.sleep(_POLL_S)
+
+    def _on_messages(self, batch):
+        self._intake += batch
+        if self._draining:
+            return
+        pause = self._next_s - time.monotonic()
+        if pause > 0:
+            time.sleep(pause)
+            self._draining = True
+            try:
+                self._subscription.drain()
+            finally:
+                self._draining = False
+        self.last_message_s = time.monotonic()
+        self._next_s = self.last_message_s + self._grouping_s()
+        self._advance()
+
+    def _grouping_s(self):
+        design = self.stream.design if self._settled else None
+        if design is None:
+            return _LONGEST_GROUPING_S
+        delay_s = design.delay_samples / design.sampling_rate_hz
+        return min(_GROUPING_SHARE * delay_s, _LONGEST_GROUPING_S)
+
+    def _advance(self):
+        """Filter what has been taken in, unless the filter is being made."""
+        if self._task is not None and self._task.done():
+            self._collect()
+        if self._task is not None or self._hold or not self._intake:
+            return
+        if self.messages is None and self._offered and not self.failure:
+            self._submit(self._make, *self._offered)
+            return
+        batch, self._intake = self._intake, []
+        if self.messages is None:
+            self.unfiltered += len(batch)
+            return
+        messages = [message.data for message in batch]
+        arrivals_ns = [message.received_time_ns for message in batch]
+        if self.stream.sample_rate_hz is None:
+            self._submit(self.messages.process, messages, arrivals_ns)
+        else:
+            self._publish(self.messages.process(messages, arrivals_ns))
+
+    def _submit(self, function, *arguments):
+        self._task = self._worker.submit(function, *arguments)
+        self._task.add_done_callback(lambda _: self._wake.trigger())
+
+    def _collect(self):
+        task, self._task = self._task, None
+        try:
+            result = task.result()
+        except FracAccelError as error:
+            self.failure = str(error)
+            if self.messages is not None:
+                self.unfiltered += self.stream.counters["waiting"]
+                self.messages = None
+            self._node.get_logger().error(f"{self.name}: {error}")
+            return
+        if self.messages is None:
+            self.messages = result
+        else:
+            self._publish(result)
+        self._advance()
+
+    def _publish(self, processed):
+        for message in processed.messages:
+            self._publisher.publish(message)
+        self.published += len(processed.messages)
+        if self._on_processed:
+            self._on_processed(processed, time.time_ns())

@@ -1,0 +1,353 @@
+"""Node ``corrector``: raw acceleration in, corrected acceleration with a covariance out."""
+
+import gc
+import hashlib
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.qos import QoSCompatibility, qos_check_compatible
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from frac_accel import cdr, health
+from frac_accel.errors import FracAccelError
+from frac_accel.live_messages import BlockMessages, LiveCorrector, SampleMessages
+from frac_accel.live_metrics import Findings, LiveMetrics, Window, evaluate
+from frac_accel.model import SensorModel
+from frac_accel.nodes._filtered_topic import FilteredTopic, raw_qos
+from frac_accel.nodes._runtime import (
+    FracAccelNode,
+    NodeError,
+    RawSubscription,
+    import_message_class,
+    normalised,
+    run_node,
+)
+
+_PERIOD_S = 1.0
+_REFERENCE_PERIOD_S = 0.1
+# Parameters that the filter is designed by, which may change while it runs.
+_DESIGN_PARAMETERS = ("model_file", "bandwidth_hz", "lowest_hz", "max_delay_s")
+_LEVELS = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
+
+
+class Corrector(FracAccelNode):
+    """Corrects ``imu/data_raw`` to ``imu/data``, and ``accel/blocks_raw`` to ``accel/blocks``."""
+
+    def __init__(self):
+        super().__init__("corrector")
+        self._declare_parameters()
+        self.worker = ThreadPoolExecutor(1, "design")
+        self._judge = ThreadPoolExecutor(1, "metrics")
+        model, self.model_hash = None, ""
+        if self.value("model_file"):
+            model, self.model_hash = _load(self.value("model_file"))
+        depth = self.value("depth")
+        type_name = self.value("message_type")
+        sample_class = import_message_class(type_name)
+        block_class = import_message_class(cdr.POINT_CLOUD2)
+        self._samples = _Channel(
+            self, sample_class, type_name, ("imu/data_raw", "imu/data"), "",
+            lambda stream: SampleMessages(stream, type_name,
+                                          lambda data: normalised(data, sample_class)))
+        self._blocks = _Channel(
+            self, block_class, cdr.POINT_CLOUD2, ("accel/blocks_raw", "accel/blocks"), "blocks/",
+            lambda stream: BlockMessages(stream, lambda data: normalised(data, block_class)),
+            is_optional=True)
+        self._channels = (self._samples, self._blocks)
+        if model:
+            for channel in self._channels:
+                channel.topic.offer(model, self._wishes())
+            self._samples.topic.start()
+        self._reference = Window(self.value("metrics_window_s"))
+        self._reference_type = type_name
+        self._reference_s = None
+        self._reference_subscription = RawSubscription(
+            self, sample_class, "imu/reference", self._on_reference, raw_qos(depth),
+            callback_group=_TakenByTimer())
+        self._figures = {}
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.add_on_set_parameters_callback(self._on_parameters)
+        self.create_service(Trigger, "~/reload_model", self._on_reload)
+        self._cpu_s, self._tick_s = time.process_time(), time.monotonic()
+        self.create_timer(_PERIOD_S, self._tick)
+        self.create_timer(_REFERENCE_PERIOD_S, self._reference_subscription.drain)
+        # A collection over all that has been imported takes as long as a hundred samples.
+        gc.collect()
+        gc.freeze()
+
+    def finish(self):
+        """Correct what is waiting and say what has been done."""
+        for channel in self._channels:
+            channel.topic.drain()
+            counters = channel.topic.counters
+            if channel is self._samples or counters.get("samples"):
+                counts = ", ".join(f"{name} {count}" for name, count in counters.items() if count)
+                print(f"{channel.topic.name}: {counts or 'nothing received'}", flush=True)
+        for worker in (self.worker, self._judge):
+            worker.shutdown()
+
+    def _declare_parameters(self):
+        self.declare("model_file", "", "sensor model (YAML) to correct with", read_only=False)
+        self.declare("sample_rate_hz", 0.0,
+                     "sampling rate of the sensor; 0: estimated from the first hundred stamps",
+                     minimum=0.0, maximum=1e8)
+        self.declare("bandwidth_hz", 0.0,
+                     "highest frequency to correct; 0: where the sensor's gain has fallen to a "
+                     "tenth, at most 0.6 of the Nyquist frequency",
+                     read_only=False, minimum=0.0, maximum=1e8)
+        self.declare("lowest_hz", 0.0,
+                     "lowest frequency to correct; 0: none, or where a high-pass leaves a tenth",
+                     read_only=False, minimum=0.0, maximum=1e8)
+        self.declare("max_delay_s", 0.0,
+                     "permitted delay of the filter; 0: the shortest that is hardly noisier than "
+                     "an ideal one", read_only=False, minimum=0.0, maximum=3600.0)
+        self.declare("noise_std", 0.0,
+                     "standard deviation of the raw noise where messages come without a "
+                     "covariance; 0: the model's", minimum=0.0, maximum=1e12)
+        types = " or ".join(cdr.SAMPLE_TYPES)
+        type_name = self.declare("message_type", cdr.IMU,
+                                 f"type of raw, corrected and reference: {types}")
+        if type_name not in cdr.SAMPLE_TYPES:
+            raise NodeError(f"parameter 'message_type' must be {types}, got {type_name!r}")
+        self.declare("depth", 2000,
+                     "queue of each topic: message rate times the longest stall, at least",
+                     minimum=1, maximum=10**6)
+        self.declare("metrics_window_s", 2.0, "time over which errors and signals are judged",
+                     minimum=0.1, maximum=60.0)
+        edges = self.declare("metrics_bands_hz", [0.0],
+                             "ascending edges of the bands that errors are published for; fewer "
+                             "than two: the filter's band only")
+        if sorted(set(edges)) != list(edges) or edges[0] < 0:
+            raise NodeError("parameter 'metrics_bands_hz' must be ascending frequencies, got "
+                            f"{list(edges)}")
+
+    def value(self, name):
+        return self.get_parameter(name).value
+
+    def _wishes(self, changed=None):
+        """What `design_inverse` is asked for, with parameters that are about to change."""
+        values = {name: self.value(name) for name in _DESIGN_PARAMETERS[1:]}
+        values.update(changed or {})
+        return {name: value or None for name, value in values.items()}
+
+    def make_stream(self, model, wishes):
+        """Stream of one topic."""
+        return LiveCorrector(model, self.value("sample_rate_hz"),
+                             noise_std=self.value("noise_std") or None, **wishes)
+
+    def _on_parameters(self, parameters):
+        changed = {p.name: p.value for p in parameters if p.name in _DESIGN_PARAMETERS}
+        if not changed:
+            return SetParametersResult(successful=True)
+        model_file = changed.pop("model_file", self.value("model_file"))
+        if not model_file:
+            return SetParametersResult(successful=False, reason="model_file: empty, expected the "
+                                                                "name of a sensor model")
+        try:
+            self._exchange(model_file, self._wishes(changed))
+        except FracAccelError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _on_reload(self, _, response):
+        try:
+            if not self.value("model_file"):
+                raise NodeError("no model to reload: set the parameter model_file")
+            self._exchange(self.value("model_file"), self._wishes())
+            response.success, response.message = True, f"{self.value('model_file')} is in use"
+        except FracAccelError as error:
+            response.success, response.message = False, str(error)
+        return response
+
+    def _exchange(self, model_file, wishes):
+        """Go on with a model and wishes; where they are bad, raise and change nothing."""
+        model, model_hash = _load(model_file)
+        for channel in self._channels:
+            channel.topic.prepare(model, wishes)
+        self.model_hash = model_hash
+        for channel in self._channels:
+            channel.topic.replace(model, wishes)
+        self.get_logger().info(f"{model_file} (sha256 {model_hash}) is in use")
+
+    def _on_reference(self, batch):
+        try:
+            samples = cdr.read_samples(self._reference_type, [message.data for message in batch])
+        except FracAccelError as error:
+            self.get_logger().warning(f"reference: {error}", throttle_duration_sec=10.0)
+            return
+        self._reference.add(samples.stamps_ns, samples.values)
+        self._reference_s = time.monotonic()
+
+    def _tick(self):
+        """Publish diagnostics and metrics."""
+        now_s = time.monotonic()
+        cpu_s = time.process_time()
+        period_s = now_s - self._tick_s
+        load = (cpu_s - self._cpu_s) / period_s
+        self._tick_s, self._cpu_s = now_s, cpu_s
+        self.publish_figure("load", load)
+        silent_s = None if self._reference_s is None else now_s - self._reference_s
+        lost = silent_s is None or silent_s > health.SILENT_AFTER_S
+        used = [channel for channel in self._channels if channel.is_used()] or [self._samples]
+        statuses = []
+        for channel in used:
+            statuses.append(channel.report(period_s, load, silent_s))
+            channel.evaluate(self._judge, None if lost else self._reference)
+        array = DiagnosticArray(status=statuses)
+        array.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(array)
+
+    def publish_figure(self, name, value):
+        if name not in self._figures:
+            # without handlers of QoS events, which the executor would wait for in every cycle
+            self._figures[name] = self.create_publisher(
+                Float64, f"~/metrics/{name}", 10,
+                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
+        self._figures[name].publish(Float64(data=float(value)))
+
+
+class _Channel:
+    """A filtered topic of the corrector with its metrics and its diagnostic status."""
+
+    def __init__(self, node, message_class, type_name, topics, prefix, make_messages,
+                 is_optional=False):
+        self._node = node
+        self._type_name = type_name
+        self._prefix = prefix
+        edges = node.value("metrics_bands_hz")
+        self._metrics = LiveMetrics(node.value("metrics_window_s"), edges)
+        self._evaluation = None
+        self._findings = Findings()
+        self._counters = {}
+        self._newest_stamp_ns = None
+        self.topic = FilteredTopic(
+            node, message_class, topics, node.value("depth"), node.worker,
+            lambda model, wishes: make_messages(node.make_stream(model, wishes)), is_optional,
+            self._on_processed)
+
+    def _on_processed(self, processed, now_ns):
+        self._metrics.add(processed.raw, processed.stamps_ns, processed.values,
+                          1e-9 * (now_ns - processed.arrivals_ns))
+        if len(processed.stamps_ns):
+            self._newest_stamp_ns = int(processed.stamps_ns[-1])
+
+    def evaluate(self, worker, reference):
+        """Judge the signals of now in another thread; publish what was found in those before."""
+        if self._evaluation is not None:
+            if not self._evaluation.done():
+                return
+            figures, self._findings = self._evaluation.result()
+            self._publish(figures)
+        self._evaluation = worker.submit(evaluate, self._metrics.snapshot(reference, self._design))
+
+    def is_used(self):
+        """Whether anybody has ever published on the raw topic."""
+        return self.topic.last_message_s is not None or bool(self._publishers())
+
+    def report(self, period_s, load, reference_silent_s):
+        """Publish the figures of the last period; returns the DiagnosticStatus."""
+        topic = self.topic
+        counters = topic.counters
+        changes = {name: count - self._counters.get(name, 0) for name, count in counters.items()}
+        self._counters = counters
+        silent_s = (None if topic.last_message_s is None
+                    else time.monotonic() - topic.last_message_s)
+        design = self._design
+        level, message = health.judge(health.Situation(
+            topic=topic.name, model_file=self._node.value("model_file"), failure=topic.failure,
+            designing=topic.designing, publishers=self._publishers(),
+            seconds_since_message=silent_s,
+            stated_rate_hz=self._node.value("sample_rate_hz"),
+            sample_rate_hz=design.sampling_rate_hz if design else None,
+            warm_up_samples=design.warm_up_samples if design else None,
+            counters=counters, changes=changes, load=load, findings=self._findings,
+            reference_silent_s=reference_silent_s))
+        figures = {"received_per_s": changes.get("samples", 0) / period_s,
+                   "corrected_per_s": changes.get("given", 0) / period_s,
+                   **self._metrics.take_latencies()}
+        if design:
+            figures["sample_rate_hz"] = design.sampling_rate_hz
+        if self._newest_stamp_ns is not None:
+            figures["stamp_age_s"] = 1e-9 * (self._node.get_clock().now().nanoseconds
+                                             - self._newest_stamp_ns)
+        self._publish(figures)
+        values = {"model_file": self._node.value("model_file"),
+                  "model_sha256": self._node.model_hash, **_in_short(design), **figures,
+                  "load": load, **counters}
+        return DiagnosticStatus(
+            level=_LEVELS[level], name=f"{self._node.get_name()}: {topic.name}", message=message,
+            hardware_id=topic.name,
+            values=[KeyValue(key=key, value=f"{value:.6g}" if isinstance(value, float)
+                             else str(value)) for key, value in values.items()])
+
+    @property
+    def _design(self):
+        return self.topic.stream.design if self.topic.stream else None
+
+    def _publish(self, figures):
+        for name, value in figures.items():
+            self._node.publish_figure(self._prefix + name, value)
+
+    def _publishers(self):
+        """Who publishes on the raw topic, with why nothing can be received from whom."""
+        result = []
+        for info in self._node.get_publishers_info_by_topic(self.topic.name):
+            compatibility, reason = qos_check_compatible(info.qos_profile, self.topic.qos)
+            refusal = ""
+            if info.topic_type != self._type_name:
+                refusal = f"publishes {info.topic_type}, expected {self._type_name}"
+            elif compatibility == QoSCompatibility.ERROR:
+                refusal = (f"offers another quality of service ({reason.strip().rstrip(';')}): set "
+                           f"qos_overrides.{self.topic.name}.subscription")
+            name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+            result.append(health.Publisher(name, refusal))
+        return tuple(result)
+
+
+class _TakenByTimer(CallbackGroup):
+    """Keeps a subscription out of the executor, which would wake for each of its messages."""
+
+    def can_execute(self, entity):
+        return False
+
+    def beginning_execution(self, entity):
+        return False
+
+    def ending_execution(self, entity):
+        pass
+
+
+def _load(model_file):
+    """Model of a file, and the file's hash."""
+    model = SensorModel.load(model_file)
+    return model, hashlib.sha256(Path(model_file).read_bytes()).hexdigest()
+
+
+def _in_short(design):
+    """What the design of the filter is worth, the worst axis of each."""
+    if design is None:
+        return {}
+    summary = design.summary()
+    axes = summary.pop("axes").values()
+    return {
+        **summary,
+        "band_hz": f"{max(axis['band_hz'][0] for axis in axes):.4g} to "
+                   f"{min(axis['band_hz'][1] for axis in axes):.4g}",
+        **{name: max(axis[name] for axis in axes)
+           for name in ("worst_amplitude_error", "worst_phase_error_deg", "noise_gain")},
+    }
+
+
+def main(arguments=None):
+    """Entry point."""
+    return run_node(Corrector, arguments)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
