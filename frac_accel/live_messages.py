@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 
 from . import cdr
-from .correction import Corrector
 from .errors import BagError, FracAccelError
 from .live_simulation import LiveSimulator
 from .samples import Samples
@@ -14,40 +13,7 @@ from .samples import Samples
 _FORGET_AT = 1000
 
 
-class _Live:
-    """What a `Stream` needs beside its samples where others wait for it."""
-
-    _prepared = None
-
-    def prepare(self, model, wishes):
-        """Design the filters of another model without using them yet.
-
-        May run in another thread than `process`; `replace` with the same model then takes no time.
-        Raises DesignError if they cannot be met.
-        """
-        if self.sample_rate_hz:
-            wishes = {**self._wishes, **wishes}
-            design = super()._design(model, self.sample_rate_hz, **wishes)
-            self._prepared = model, wishes, design
-
-    def _design(self, model, sample_rate_hz, **wishes):
-        if self._prepared and self._prepared[0] is model and self._prepared[1] == wishes:
-            return self._prepared[2]
-        return super()._design(model, sample_rate_hz, **wishes)
-
-    @property
-    def waiting(self):
-        """Running numbers of the samples that can still be given out, ascending."""
-        if self.design is None:
-            return np.concatenate([np.empty(0, np.int64), *(block[0] for block in self._held)])
-        return self._waiting_index[self._waiting_index > self._last_given]
-
-
-class LiveCorrector(_Live, Corrector):
-    """`Corrector` whose next model can be prepared while this one runs."""
-
-
-class NoisySensor(_Live, LiveSimulator):
+class NoisySensor(LiveSimulator):
     """`LiveSimulator` with white noise on what it says.
 
     Parameters
@@ -105,7 +71,7 @@ class SampleMessages:
 
     Parameters
     ----------
-    stream : LiveCorrector or NoisySensor
+    stream : Corrector or NoisySensor
     type_name : str
         One of `cdr.SAMPLE_TYPES`.
     plain : callable

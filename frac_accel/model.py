@@ -94,6 +94,7 @@ class SensorModel:
         self._own = {name: AxisModel(axis.core, _in_signal_order(axis.effects))
                      for name, axis in (axes or {}).items()}
         self.axes = tuple(self._own.get(name, self._common) for name in AXES)
+        self._stages = _sample_stages(self.axes)
         for name, axis in zip(AXES, self.axes):
             axis.effective_core.require_stable(f"axes.{name}.core" if name in self._own else "core")
 
@@ -141,24 +142,15 @@ class SensorModel:
 
     def apply_sample_effects(self, values):
         """Effects that act on the samples after the linear response; shape (n, 3) in and out."""
-        for effect, by_axis in self._sample_stages():
+        for effect, by_axis in self._stages:
             values = effect.simulate(values, by_axis)
         return values
 
     def remove_sample_effects(self, values):
         """Inverse of `apply_sample_effects`."""
-        for effect, by_axis in reversed(self._sample_stages()):
+        for effect, by_axis in reversed(self._stages):
             values = effect.invert(values, by_axis)
         return values
-
-    def _sample_stages(self):
-        """Pairs of effect class and its instances by axis index, in signal order."""
-        stages = {}
-        for index, axis in enumerate(self.axes):
-            for effect in axis.effects:
-                stages.setdefault((effect.stage, effect.cause), {})[index] = effect
-        return [(type(next(iter(by_axis.values()))), by_axis)
-                for _, by_axis in sorted(stages.items(), key=lambda item: item[0])]
 
     @classmethod
     def from_dict(cls, data, where=""):
@@ -268,6 +260,16 @@ class SensorModel:
             if temporary:
                 os.unlink(temporary)
             raise ModelError(f"{path}: cannot write the model: {error.strerror}") from None
+
+
+def _sample_stages(axes):
+    """Pairs of effect class and its instances by axis index, in signal order."""
+    stages = {}
+    for index, axis in enumerate(axes):
+        for effect in axis.effects:
+            stages.setdefault((effect.stage, effect.cause), {})[index] = effect
+    return [(type(next(iter(by_axis.values()))), by_axis)
+            for _, by_axis in sorted(stages.items(), key=lambda item: item[0])]
 
 
 class _Loader(yaml.SafeLoader):

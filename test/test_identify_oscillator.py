@@ -61,8 +61,9 @@ def test_parameters_are_close_at_40_db():
 
 def test_shock_record():
     rng = np.random.default_rng(20263)
-    sensor = rig.Sensor({"type": "oscillator", "natural_frequency_hz": 40e3, "damping_ratio": 0.02,
-                         "damping_order": 1.0, "sensitivity": 0.227}, {"time_delay": {"delay_s": 2e-6}})
+    core = {"type": "oscillator", "natural_frequency_hz": 40e3, "damping_ratio": 0.02,
+            "damping_order": 1.0, "sensitivity": 0.227}
+    sensor = rig.Sensor(core, {"time_delay": {"delay_s": 2e-6}})
     excitation = rig.shock(1e6, 0.01, 40e-6, amplitude=(8e4, 0.0, 0.0))
     record = rig.simulate_record(sensor, excitation, rng, snr_db=50)
     result = identify(pair_of(record), structure="oscillator")

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from frac_accel import cdr
+from frac_accel.correction import Corrector
 from frac_accel.errors import BagError
-from frac_accel.live_messages import BlockMessages, LiveCorrector, NoisySensor, SampleMessages
+from frac_accel.live_messages import BlockMessages, NoisySensor, SampleMessages
 from frac_accel.model import SensorModel
 from frac_accel.samples import Samples
 
@@ -47,9 +48,9 @@ def test_outputs_belong_to_their_input_and_arrival(model):
     stamps = raw.stamps_ns.copy()
     stamps[200] = stamps[199]
     raw = raw._replace(stamps_ns=stamps)
-    messages = SampleMessages(LiveCorrector(model, RATE_HZ), cdr.IMU, unreadable)
+    messages = SampleMessages(Corrector(model, RATE_HZ), cdr.IMU, unreadable)
     parts = run(messages, cdr.encode_samples(cdr.IMU, raw), 40)
-    expected = LiveCorrector(model, RATE_HZ).process(*raw[:3])
+    expected = Corrector(model, RATE_HZ).process(*raw[:3])
     out = cdr.read_samples(cdr.IMU, [data for part in parts for data in part.messages])
     np.testing.assert_array_equal(out.values, expected.values)
     np.testing.assert_array_equal(out.stamps_ns, expected.stamps_ns)
@@ -68,10 +69,10 @@ def test_messages_that_never_come_out_are_forgotten(model, kind):
         values[500:] = np.nan
     else:
         stamps[500:] += np.arange(2500) * 10**9
-    messages = SampleMessages(LiveCorrector(model, RATE_HZ), cdr.IMU, unreadable)
+    messages = SampleMessages(Corrector(model, RATE_HZ), cdr.IMU, unreadable)
     run(messages, cdr.encode_samples(cdr.IMU, Samples.of(stamps, values)), 40)
     assert len(messages._waiting) <= 1040
-    messages = BlockMessages(LiveCorrector(model, RATE_HZ), unreadable)
+    messages = BlockMessages(Corrector(model, RATE_HZ), unreadable)
     for i in range(3000):
         messages.process([cdr.encode_point_cloud(Samples.of(stamps[i:i + 1], values[i:i + 1]))],
                          [i])
@@ -82,11 +83,11 @@ def test_unreadable_messages_are_counted_and_others_made_plain(model):
     raw = cdr.encode_samples(cdr.IMU, samples(200))
     strange = [b"\x00\x07" + data[2:] for data in raw[50:60]]
     messages = SampleMessages(
-        LiveCorrector(model, RATE_HZ), cdr.IMU,
+        Corrector(model, RATE_HZ), cdr.IMU,
         lambda data: b"\x00\x01" + data[2:] if data[1:2] == b"\7" else unreadable(data))
     part = messages.process([*raw[:50], *strange, b"", b"garbage", *raw[60:]], list(range(202)))
     assert messages.malformed == 2
-    expected = LiveCorrector(model, RATE_HZ).process(*samples(200)[:3])
+    expected = Corrector(model, RATE_HZ).process(*samples(200)[:3])
     np.testing.assert_array_equal(part.values, expected.values)
 
 
@@ -94,9 +95,9 @@ def test_a_prepared_model_takes_over_without_a_gap(model):
     other = SensorModel.load(MODELS / "fractional.yaml")
     raw = samples(2000)
     data = cdr.encode_samples(cdr.IMU, raw)
-    messages = SampleMessages(LiveCorrector(model, RATE_HZ), cdr.IMU, unreadable)
+    messages = SampleMessages(Corrector(model, RATE_HZ), cdr.IMU, unreadable)
     parts = [messages.process(data[:1000], [0] * 1000)]
-    messages.stream.prepare(other, {"bandwidth_hz": 200.0})
+    messages.stream.prepare(other, bandwidth_hz=200.0)
     prepared = messages.stream._prepared[2]
     parts += [messages.replace(other, {"bandwidth_hz": 200.0}),
               messages.process(data[1000:], [0] * 1000)]
@@ -110,11 +111,11 @@ def test_a_prepared_model_takes_over_without_a_gap(model):
 def test_blocks_are_the_same_as_samples(model):
     raw = samples(1000)
     blocks = [Samples(*(column[i:i + 50] for column in raw[:3]), "f") for i in range(0, 1000, 50)]
-    messages = BlockMessages(LiveCorrector(model, RATE_HZ), unreadable)
+    messages = BlockMessages(Corrector(model, RATE_HZ), unreadable)
     part = messages.process([cdr.encode_point_cloud(block) for block in blocks] + [b"x"],
                             list(range(21)))
     out = cdr.read_samples(cdr.POINT_CLOUD2, part.messages)
-    expected = LiveCorrector(model, RATE_HZ).process(*raw[:2])
+    expected = Corrector(model, RATE_HZ).process(*raw[:2])
     np.testing.assert_array_equal(out.values, expected.values)
     np.testing.assert_array_equal(out.stamps_ns, expected.stamps_ns)
     np.testing.assert_array_equal(part.arrivals_ns, expected.index // 50)

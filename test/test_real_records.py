@@ -1,8 +1,8 @@
 """Real measurements: what identify and correct make of them."""
 
 import pytest
-import real_records
 import readme_examples
+import real_records
 
 pytestmark = [pytest.mark.real_data, pytest.mark.skipif(
     not real_records.FOLDER.is_dir(), reason="the records in ../shared/data are not here")]

@@ -41,10 +41,10 @@ def add_filter(parser):
                         help="sampling rate (default: estimated from the stamps)")
     parser.add_argument("--bandwidth", type=positive, metavar="HZ",
                         help="highest frequency to correct (default: the model's band, or where "
-                             "the sensor has lost 90 %% of its gain)")
+                             "the sensor has lost 80 %% of its gain)")
     parser.add_argument("--lowest", type=positive, metavar="HZ",
                         help="lowest frequency to correct (default: 0, or where a high-pass has "
-                             "lost 90 %% of its gain)")
+                             "lost 80 %% of its gain)")
     parser.add_argument("--max-delay", type=positive, metavar="S",
                         help="permitted delay of the filter (default: at most four periods of the "
                              "highest frequency)")

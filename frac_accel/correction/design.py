@@ -11,8 +11,8 @@ from ..model import AXES
 from .filter import ParallelFilter
 
 # A band ends where the sensor's gain has fallen to this share of its reference gain: the inverse
-# multiplies the noise there by ten. At the latest it ends at 0.6 of the Nyquist frequency.
-GAIN_AT_BAND_EDGE = 0.1
+# multiplies the noise there by five. At the latest it ends at 0.6 of the Nyquist frequency.
+GAIN_AT_BAND_EDGE = 0.2
 NYQUIST_SHARE = 0.6
 # Worst relative error of the complex response in the band, where the user names none.
 TOLERANCE = 2e-3
@@ -34,7 +34,7 @@ STATIC = 5e-4
 _MOST_TAPS = 4096
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class DesignedFilter:
     """A filter for one axis with what it is worth.
 
@@ -63,7 +63,7 @@ class DesignedFilter:
     noise_gain: float
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class FilterDesign:
     """Filters for the three axes of a sensor model at one sampling rate.
 
@@ -128,14 +128,15 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
     sampling_rate_hz : float
         Rate of the record [Hz].
     bandwidth_hz : float, optional
-        Highest frequency to correct [Hz]. Default: where the sensor's gain has fallen to a tenth,
-        at most 0.6 of the Nyquist frequency.
+        Highest frequency to correct [Hz]. Default: where the sensor's gain has fallen to a fifth,
+        at most 0.6 of the Nyquist frequency or the end of the band in which the model was
+        identified.
     max_delay_s : float, optional
         Permitted delay of the filter [s]. Default: the shortest whose noise gain is within 30 % of
         that of an ideal band limit, at most four periods of the highest frequency unless the
         tolerance needs more.
     lowest_hz : float, optional
-        Lowest frequency to correct [Hz]. Default: 0, or where a high-pass leaves a tenth.
+        Lowest frequency to correct [Hz]. Default: 0, or where a high-pass leaves a fifth.
     tolerance : float
         Permitted worst relative error of the complex response in the band.
 
@@ -156,7 +157,8 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
         if value is not None:
             _positive(value, name)
     model.remove_sample_effects(np.zeros((1, 3)))  # refuses those that cannot be undone
-    bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz)
+    known = model.band_hz[1] if model.band_hz else np.inf
+    bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz, known)
              for name, axis in zip(AXES, model.axes)]
     # stamps are whole nanoseconds; what is left of the delay is done by the filters
     sensor_delay_ns = int(np.ceil(max(axis.delay_s for axis in model.axes) * 1e9 - 1e-3))
@@ -262,6 +264,8 @@ class _Problem:
         if case not in self._solved:
             self._solved[case] = self._solve(*case)
         design = self._solved[case]
+        if not wait:
+            return design
         return dataclasses.replace(
             design, delay_s=design.delay_s + wait / self.rate,
             filter=dataclasses.replace(design.filter, lead=design.filter.lead + wait))
@@ -496,7 +500,7 @@ def _positive(value, name):
     return float(value)
 
 
-def _band(axis, name, rate, bandwidth_hz, lowest_hz):
+def _band(axis, name, rate, bandwidth_hz, lowest_hz, known_hz):
     """Lowest and highest frequency [Hz] of the correction of one axis."""
     nyquist = rate / 2
     core = axis.effective_core
@@ -518,7 +522,7 @@ def _band(axis, name, rate, bandwidth_hz, lowest_hz):
     last = first + (int(after[0]) if len(after) else len(grid) - first) - 1
     low = 0.0 if first == 0 else float(grid[first])
     low = low if lowest_hz is None else float(lowest_hz)
-    high = float(grid[last]) if bandwidth_hz is None else float(bandwidth_hz)
+    high = min(float(grid[last]), known_hz) if bandwidth_hz is None else float(bandwidth_hz)
     if low >= high:
         raise DesignError(f"axis {name}: the band from {low:.4g} Hz to {high:.4g} Hz is empty")
     return low, high

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class ParallelFilter:
     r"""Discrete filter :math:`G(z) = \sum_k b_k z^{-k} + \sum_j r_j / (1 - p_j z^{-1})`.
 
@@ -84,7 +84,7 @@ class ParallelFilter:
 
 
 class FilterState:
-    """A `ParallelFilter` running over the samples of one axis, in blocks of any length.
+    """A `ParallelFilter` running over the samples of some axes, in blocks of any length.
 
     Every output is computed by the same operations in the same order however the record is split,
     so the numbers are the same to the last bit.
@@ -92,22 +92,23 @@ class FilterState:
     Parameters
     ----------
     parallel_filter : ParallelFilter
-    level : float
-        The input before the first sample: a constant.
+    level : ndarray, shape (k,)
+        The input of each axis before the first sample: a constant.
     """
 
-    def __init__(self, parallel_filter, level=0.0):
+    def __init__(self, parallel_filter, level):
         # lfilter convolves a pure FIR by another, length-dependent route: a zero keeps it away
         links = [(np.asarray(parallel_filter.taps, float), np.array([1.0, 0.0]))]
         links += parallel_filter.sections()
-        self._links = [(b, a, level * _steady_state(b, a)) for b, a in links]
-        self._waiting = np.full(parallel_filter.lead, float(level))
+        self._links = [(b, a, np.outer(level, _steady_state(b, a))) for b, a in links]
+        self._waiting = np.repeat(level[:, None], parallel_filter.lead, axis=1)
 
     def process(self, values):
-        """Outputs for the next inputs, shape (n,)."""
-        if len(self._waiting):
-            queue = np.concatenate([self._waiting, values])
-            values, self._waiting = queue[:len(values)], queue[len(values):]
+        """Outputs for the next inputs; shape (k, n) in and out."""
+        if self._waiting.shape[1]:
+            queue = np.concatenate([self._waiting, values], axis=1)
+            count = values.shape[1]
+            values, self._waiting = queue[:, :count], queue[:, count:]
         total = None
         for i, (b, a, state) in enumerate(self._links):
             output, state = lfilter(b, a, values, zi=state)

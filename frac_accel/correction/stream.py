@@ -4,14 +4,15 @@ import collections
 import dataclasses
 
 import numpy as np
-from scipy.signal import lfilter
 
 from ..errors import FracAccelError
-from .filter import FilterState
-from .timing import RATE_SAMPLES, SampleClock, estimate_rate
+from .filter import FilterState, ParallelFilter
+from .timing import LARGEST, RATE_SAMPLES, SampleClock, estimate_rate
 
 # Samples kept for a change of model: the new filter starts with these behind it.
 HISTORY = 4096
+# Most samples that are held while their stamps do not advance.
+HELD = 100_000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,10 +74,11 @@ class Stream:
         self._wishes = wishes
         self._model = model
         self._noise_std = noise_std
-        self._held = []
+        self._held, self._held_count, self._advancing = [], 0, False
         self._samples = 0
-        self._totals = dict.fromkeys(("given", "warm_up", "cut_off"), 0)
+        self._totals = dict.fromkeys(("given", "warm_up", "cut_off", "duplicates"), 0)
         self._clock = None
+        self._prepared = None
         self.design = None
         if sample_rate_hz:
             self._start(float(sample_rate_hz))
@@ -89,11 +91,19 @@ class Stream:
     @property
     def counters(self):
         """How many samples met which fate, as a new dict of str to int."""
-        timing = self._clock.counters if self._clock else {}
-        waiting = sum(len(block[0]) for block in self._held)
+        counters = {"samples": self._samples, "waiting": self._held_count, **self._totals}
         if self._clock:
-            waiting += int(np.sum(self._waiting_index >= 0))
-        return {"samples": self._samples, "waiting": waiting, **self._totals, **timing}
+            counters["waiting"] = int(np.sum(self._waiting_index >= 0))
+            for name, count in self._clock.counters.items():
+                counters[name] = counters.get(name, 0) + count
+        return counters
+
+    @property
+    def waiting(self):
+        """Running numbers of the samples that can still be given out, ascending."""
+        if self._clock is None:
+            return np.concatenate([np.empty(0, np.int64), *(block[0] for block in self._held)])
+        return self._waiting_index[self._waiting_index > self._last_given]
 
     def process(self, stamps_ns, values, variance=None):
         """Filter the next samples.
@@ -130,15 +140,14 @@ class Stream:
         if variance.shape != values.shape:
             raise FracAccelError(f"variance: shape {variance.shape} given, expected "
                                  f"{values.shape}")
+        # no noise has such a variance: it is not known
+        variance = np.where((variance >= 0) & (variance < LARGEST), variance, np.nan)
         index = np.arange(self._samples, self._samples + len(stamps))
         self._samples += len(stamps)
-        if self._clock is None:
-            self._held.append((index, stamps, values, variance))
-            if not self._estimate(RATE_SAMPLES):
-                return _concatenated([])
-            index, stamps, values, variance = (np.concatenate(part) for part in zip(*self._held))
-            self._held = []
-        return self._filter(index, stamps, values, variance)
+        if self._clock is not None:
+            return self._filter(index, stamps, values, variance)
+        self._hold(index, stamps, values, variance)
+        return self._filter_held() if self._estimate(RATE_SAMPLES) else _concatenated([])
 
     def finish(self):
         """Filter what is still held because the stream ended before its rate was known.
@@ -155,12 +164,25 @@ class Stream:
         if self._clock is not None or not self._held:
             return _concatenated([])
         if not self._estimate(2):
-            count = sum(len(block[0]) for block in self._held)
             raise FracAccelError(
-                f"the sampling rate cannot be estimated from {count} sample(s) whose stamps do not "
-                "advance; give it as sample_rate_hz")
-        held, self._held = self._held, []
-        return self._filter(*(np.concatenate(part) for part in zip(*held)))
+                f"the sampling rate cannot be estimated from {self._samples} sample(s) whose "
+                "stamps do not advance; give it as sample_rate_hz")
+        return self._filter_held()
+
+    def prepare(self, model, **wishes):
+        """Design the filters of another model without using them yet.
+
+        It may run in another thread than `process`; `replace` with the same model and wishes then
+        takes no time.
+
+        Raises
+        ------
+        DesignError
+            If they cannot be met.
+        """
+        wishes = {**self._wishes, **wishes}
+        if self.sample_rate_hz:
+            self._prepared = model, wishes, self._design(model, self.sample_rate_hz, **wishes)
 
     def replace(self, model, **wishes):
         """Go on with another model, without losing a sample.
@@ -185,7 +207,11 @@ class Stream:
         if self._clock is None:
             self._model, self._wishes = model, wishes
             return _concatenated([])
-        design = self._design(model, self.sample_rate_hz, **wishes)
+        prepared, self._prepared = self._prepared, None
+        if prepared and prepared[0] is model and prepared[1] == wishes:
+            design = prepared[2]
+        else:
+            design = self._design(model, self.sample_rate_hz, **wishes)
         self._model, self._wishes = model, wishes
         self._use(design)
         self._begin()
@@ -203,16 +229,34 @@ class Stream:
         """What happens to the samples after the filters; shape (n, 3) in and out."""
         return values
 
+    def _hold(self, index, stamps, values, variance):
+        """Keep samples until there are enough to tell the rate."""
+        before = self._held[-1][1][-1:] if self._held else stamps[:1]
+        if not len(stamps):
+            return
+        self._advancing |= bool((np.diff(np.r_[before, stamps]) > 0).any())
+        self._held.append((index, stamps, values, variance))
+        self._held_count += len(index)
+        if self._held_count > HELD and not self._advancing:
+            # stamps that never advance: all but the newest sample repeat it
+            self._held = [tuple(part[-1:] for part in self._held[-1])]
+            self._totals["duplicates"] += self._held_count - 1
+            self._held_count = 1
+
+    def _filter_held(self):
+        held, self._held, self._held_count = self._held, [], 0
+        return self._filter(*(np.concatenate(part) for part in zip(*held)))
+
     def _estimate(self, least):
         """Start at the rate of the first stamps, if there are enough of them.
 
         Which stamps these are must not depend on the blocks in which they come.
         """
-        stamps = np.concatenate([block[1] for block in self._held])
-        advancing = np.flatnonzero(np.diff(stamps) > 0)
-        if not advancing.size or len(stamps) < least:
+        if not self._advancing or self._held_count < least:
             return False
-        self._start(estimate_rate(stamps[:max(RATE_SAMPLES, advancing[0] + 2)]))
+        stamps = np.concatenate([block[1] for block in self._held])
+        first = int(np.argmax(np.diff(stamps) > 0))
+        self._start(estimate_rate(stamps[:max(RATE_SAMPLES, first + 2)]))
         return True
 
     def _start(self, rate):
@@ -267,8 +311,13 @@ class Stream:
         self._waiting_index = np.r_[self._waiting_index, run.index]
         self._waiting_stamps = np.r_[self._waiting_stamps, run.stamps_ns]
         values = self._before(run.values)
-        known = np.where(np.isnan(run.variance), self._noise_variance, run.variance)
+        stated = ~np.isnan(run.variance)
+        known = np.where(stated, run.variance, self._noise_variance)
         variance = sum(known[:, [axis]] * self._spread[axis] for axis in range(3))
+        noise_known = (stated | (self._noise_variance > 0)).all(axis=1)
+        # a bridged sample's variance says nothing of the noise: the sample after it does
+        following = np.where(run.index < 0, len(run.index) - 1, np.arange(len(run.index)))
+        noise_known = noise_known[np.minimum.accumulate(following[::-1])[::-1]]
         if self._states is None:
             if self._kept is not None:
                 values = np.concatenate([self._kept[0], values])
@@ -279,23 +328,28 @@ class Stream:
                 return _concatenated([])
             self._fill(values[:warm_up], variance[:warm_up])
             values, variance = values[warm_up:], variance[warm_up:]
-        return self._give(values, variance)
+        return self._give(values, variance, noise_known[-len(values):])
 
     def _fill(self, values, variance):
         """Bring the filters into the state that they have when their taps are first full."""
         self._kept = None
         self._states = []
-        for axis, design in enumerate(self.design.axes):
-            column = values[:, axis]
+        axes = self.design.axes
+        # axes with the same filter run through it together
+        for design in dict.fromkeys(axes):
+            rows = [axis for axis in range(3) if axes[axis] is design]
+            columns = values[:, rows].T
             # behind a high-pass every steady motion leaves the output at rest
-            level = 0.0 if design.band_hz[0] else column.mean()
+            level = np.zeros(len(rows)) if design.band_hz[0] else columns.mean(axis=1)
             state = FilterState(design.filter, level)
-            state.process(column)
-            head = np.square(design.filter.impulse_head)
-            noise = np.r_[np.zeros(design.filter.lead), head], np.array([1.0, 0.0])
-            initial = np.zeros(max(len(noise[0]), 2) - 1)
-            _, initial = lfilter(*noise, variance[:, axis], zi=initial)
-            self._states.append((state, noise, initial, np.mean((column - level)**2)))
+            state.process(columns)
+            head = np.r_[np.zeros(design.filter.lead), np.square(design.filter.impulse_head)]
+            noise = FilterState(ParallelFilter(head, np.empty(0), np.empty(0)),
+                                np.zeros(len(rows)))
+            noise.process(variance[:, rows].T)
+            later = max(design.noise_gain**2 - head.sum(), 0.0)
+            power = np.mean((columns - level[:, None])**2, axis=1)
+            self._states.append((rows, design.filter, state, noise, later, power))
         self._since_start = len(values)
         # the oldest of the waiting will have been passed over before the first output
         skipped = len(values) - self.design.delay_samples
@@ -304,18 +358,16 @@ class Stream:
         self._waiting_index = self._waiting_index[skipped:]
         self._waiting_stamps = self._waiting_stamps[skipped:]
 
-    def _give(self, values, variance):
+    def _give(self, values, variance, noise_known):
         count = len(values)
         result, spread = np.empty((count, 3)), np.empty((count, 3))
         since = self._since_start + np.arange(1, count + 1)
-        for axis, design in enumerate(self.design.axes):
-            state, noise, initial, power = self._states[axis]
-            result[:, axis] = state.process(values[:, axis])
-            soon, initial = lfilter(*noise, variance[:, axis], zi=initial)
-            self._states[axis] = state, noise, initial, power
-            later = max(design.noise_gain**2 - noise[0].sum(), 0.0)
-            history = power * design.filter.unknown_history(since)**2
-            spread[:, axis] = soon + later * variance[:, axis] + history
+        for rows, parallel_filter, state, noise, later, power in self._states:
+            result[:, rows] = state.process(values[:, rows].T).T
+            known = variance[:, rows].T
+            history = parallel_filter.unknown_history(since)**2
+            spread[:, rows] = (noise.process(known) + later * known + np.outer(power, history)).T
+        spread[~noise_known] = np.nan
         self._since_start += count
         index, stamps = self._waiting_index[:count], self._waiting_stamps[:count]
         self._waiting_index = self._waiting_index[count:]
@@ -325,8 +377,7 @@ class Stream:
             self._last_given = int(index[given][-1])
         self._totals["given"] += int(given.sum())
         return Filtered(index[given], stamps[given] - self.design.sensor_delay_ns,
-                        self._after(result[given]),
-                        np.where(spread[given] > 0, spread[given], np.nan))
+                        self._after(result[given]), spread[given])
 
 
 def _concatenated(parts):

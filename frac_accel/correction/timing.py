@@ -10,7 +10,8 @@ The stated policy, each case counted:
 * The same stamp again is dropped (``duplicates``), and so is a stamp that goes back
   (``stamps_back``); after `PATIENCE` of these in a row the clock itself has been set back, and the
   filter starts anew. A stamp that is `MISSING` intervals early is one sample too many (``early``).
-* A sample with a value that is not finite is dropped (``not_finite``) and bridged like a gap.
+* A sample with a value that is not finite, or beyond `LARGEST` (its filtered value would not be),
+  is dropped (``not_finite``) and bridged like a gap.
 """
 
 import dataclasses
@@ -22,6 +23,7 @@ RATE_SAMPLES = 100
 JITTER = 0.1
 MISSING = 0.75
 PATIENCE = 10
+LARGEST = 1e100
 _FOLLOW = 0.1
 _SCATTER_MEMORY = 0.01
 _CHUNK = 4096
@@ -95,7 +97,7 @@ class SampleClock:
         return _joined(runs)
 
     def _sort(self, index, stamps, values, variance, runs):
-        finite = np.isfinite(values).all(axis=1)
+        finite = (np.abs(values) < LARGEST).all(axis=1)
         position = 0
         while position < len(index):
             if self._last is None:

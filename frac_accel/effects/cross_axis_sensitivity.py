@@ -1,6 +1,7 @@
 """Response of an axis to the acceleration along the others."""
 
 import dataclasses
+import functools
 
 import numpy as np
 
@@ -36,11 +37,16 @@ class CrossAxisSensitivity(Effect):
 
     @classmethod
     def invert(cls, values, by_axis):
-        matrix = cls.matrix(by_axis)
-        if np.linalg.cond(matrix) > 1e3:
-            raise ModelError("effects: cross_axis_sensitivity cannot be inverted, its axes are "
-                             "nearly the same direction")
-        return _mix(values, np.linalg.inv(matrix))
+        return _mix(values, _inverse(tuple(by_axis.items())))
+
+
+@functools.lru_cache
+def _inverse(by_axis):
+    matrix = CrossAxisSensitivity.matrix(dict(by_axis))
+    if np.linalg.cond(matrix) > 1e3:
+        raise ModelError("effects: cross_axis_sensitivity cannot be inverted, its axes are nearly "
+                         "the same direction")
+    return np.linalg.inv(matrix)
 
 
 def _mix(values, matrix):

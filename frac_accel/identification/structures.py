@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..core import FractionalTransferFunction, Oscillator
+from ..core import Oscillator
 
 _FREQUENCIES = 24
 _DAMPINGS = (0.02, 0.08, 0.25, 0.7, 1.5)

@@ -135,8 +135,10 @@ class FilteredTopic:
         # the thread that designs has the stream for itself while its rate is still unknown
         self._hold = self.messages is None or self.stream.sample_rate_hz is None
         try:
-            make = self._make if self.messages is None else self.stream.prepare
-            design = self._worker.submit(make, model, wishes)
+            if self.messages is None:
+                design = self._worker.submit(self._make, model, wishes)
+            else:
+                design = self._worker.submit(self.stream.prepare, model, **wishes)
             while not design.done():
                 self._subscription.drain()
                 time.sleep(_POLL_S)

@@ -14,9 +14,9 @@ from rclpy.qos import QoSCompatibility, qos_check_compatible
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from frac_accel import cdr, health
+from frac_accel import cdr, correction, health
 from frac_accel.errors import FracAccelError
-from frac_accel.live_messages import BlockMessages, LiveCorrector, SampleMessages
+from frac_accel.live_messages import BlockMessages, SampleMessages
 from frac_accel.live_metrics import Findings, LiveMetrics, Window, evaluate
 from frac_accel.model import SensorModel
 from frac_accel.nodes._filtered_topic import FilteredTopic, raw_qos
@@ -99,10 +99,10 @@ class Corrector(FracAccelNode):
                      minimum=0.0, maximum=1e8)
         self.declare("bandwidth_hz", 0.0,
                      "highest frequency to correct; 0: where the sensor's gain has fallen to a "
-                     "tenth, at most 0.6 of the Nyquist frequency",
+                     "fifth, at most 0.6 of the Nyquist frequency",
                      read_only=False, minimum=0.0, maximum=1e8)
         self.declare("lowest_hz", 0.0,
-                     "lowest frequency to correct; 0: none, or where a high-pass leaves a tenth",
+                     "lowest frequency to correct; 0: none, or where a high-pass leaves a fifth",
                      read_only=False, minimum=0.0, maximum=1e8)
         self.declare("max_delay_s", 0.0,
                      "permitted delay of the filter; 0: the shortest that is hardly noisier than "
@@ -138,8 +138,8 @@ class Corrector(FracAccelNode):
 
     def make_stream(self, model, wishes):
         """Stream of one topic."""
-        return LiveCorrector(model, self.value("sample_rate_hz"),
-                             noise_std=self.value("noise_std") or None, **wishes)
+        return correction.Corrector(model, self.value("sample_rate_hz"),
+                                    noise_std=self.value("noise_std") or None, **wishes)
 
     def _on_parameters(self, parameters):
         changed = {p.name: p.value for p in parameters if p.name in _DESIGN_PARAMETERS}
