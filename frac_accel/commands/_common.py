@@ -106,6 +106,12 @@ def progress(total, unit="msg"):
     return tqdm(total=total, unit=unit, delay=2, leave=False, file=sys.stderr, unit_scale=True)
 
 
+def step(bar, words):
+    """Show what is being done, if it has been two seconds."""
+    bar.set_description(words, refresh=False)
+    bar.update()
+
+
 def provenance(bag, command):
     """Where a result comes from: the bag, its content's hash, the command and our version."""
     from importlib.metadata import PackageNotFoundError, version

@@ -7,8 +7,10 @@ from ._common import (
     add_json,
     add_topics,
     open_bag,
+    progress,
     provenance,
     require_output,
+    step,
     write_json,
 )
 
@@ -31,8 +33,9 @@ def run(arguments):
     pair = load_pair(arguments.bag, arguments.reference, arguments.sensor, arguments.axis)
     command = (f"frac_accel identify {arguments.bag} --structure {arguments.structure} --reference "
                f"{arguments.reference} --sensor {arguments.sensor} --axis {arguments.axis}")
-    result = identify(pair, arguments.axis, arguments.structure,
-                      provenance(arguments.bag, command))
+    with progress(None, unit="step") as bar:
+        result = identify(pair, arguments.axis, arguments.structure,
+                          provenance(arguments.bag, command), lambda words: step(bar, words))
     result.model.save(arguments.output)
     low, high = result.model.band_hz
     print(f"{len(pair)} samples at {pair.sampling_rate_hz:.6g} Hz, excited from {low:.4g} to "

@@ -1,6 +1,7 @@
 """From a measured pair to a sensor model with standard uncertainties."""
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +66,7 @@ class Identification:
                 "nrmse": self.nrmse, "held_out_nrmse": self.held_out_nrmse, "notes": self.notes}
 
 
-def identify(pair, axis="x", structure="auto", provenance=None):
+def identify(pair, axis="x", structure="auto", provenance=None, progress=None):
     """Identify a sensor model.
 
     Parameters
@@ -79,6 +80,8 @@ def identify(pair, axis="x", structure="auto", provenance=None):
         it predicts held-out data better.
     provenance : dict, optional
         Where the data come from; becomes part of the model.
+    progress : callable, optional
+        Called with a few words before each step that may take seconds.
 
     Returns
     -------
@@ -94,7 +97,7 @@ def identify(pair, axis="x", structure="auto", provenance=None):
                              f"{', '.join(STRUCTURES)}")
     if isinstance(pair, (str, Path)):
         pair = load_pair(pair, axis=axis)
-    data = _Data.of(pair, AXES.index(axis))
+    data = _Data.of(pair, AXES.index(axis), progress or (lambda words: None))
     if structure == "auto":
         chosen, reason = _choose(data)
     else:
@@ -108,11 +111,12 @@ class _Data:
     reference: np.ndarray
     sensor: np.ndarray
     spread: float
+    progress: Callable
 
     @classmethod
-    def of(cls, pair, column):
+    def of(cls, pair, column, progress):
         sensor = pair.sensor[:, column]
-        return cls(pair, pair.reference[:, column], sensor, float(np.std(sensor)))
+        return cls(pair, pair.reference[:, column], sensor, float(np.std(sensor)), progress)
 
     def fit(self, structure, part=slice(None), start=None):
         return fit_output_error(structure, self.reference[part], self.sensor[part],
@@ -134,7 +138,9 @@ class _Candidate:
     def of(cls, name, data):
         structure = _STRUCTURES[name]
         require_excitation(data.reference, data.pair.sampling_rate_hz, len(structure.names) + 2)
+        data.progress(f"fitting the {name} structure")
         fit = data.fit(structure)
+        data.progress(f"judging the {name} structure on held-out data")
         return cls(structure, name, fit, fit.rmse / data.spread, _held_out(structure, fit, data))
 
 
