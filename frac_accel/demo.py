@@ -128,22 +128,22 @@ def _live(bag, model_file, recorded):
         "corrector": [f"model_file:={model_file}", "depth:=10000", *reliable],
         "player": [f"bag:={bag}", "wait_for_subscribers:=2"],
     }
-    processes = {}
+    processes, logs = {}, {node: recorded.parent / f"{node}.log" for node in commands}
+    deadline = time.monotonic() + _PATIENCE_S
     try:
         for node, parameters in commands.items():
             arguments = [part for parameter in parameters for part in ("-p", parameter)]
-            processes[node] = subprocess.Popen(
-                [sys.executable, "-m", f"frac_accel.nodes.{node}", "--ros-args", *arguments],
-                env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        deadline = time.monotonic() + _PATIENCE_S
+            with open(logs[node], "w", encoding="utf-8") as log:
+                processes[node] = subprocess.Popen(
+                    [sys.executable, "-m", f"frac_accel.nodes.{node}", "--ros-args", *arguments],
+                    env=environment, stdout=log, stderr=log)
+            if node == "corrector":
+                # what is played before the recorder has found the corrected topic is not recorded
+                _wait_for(lambda: f"recording {CORRECTED_TOPIC} " in logs["recorder"].read_text(),
+                          processes, logs, deadline)
         for node in ("player", "recorder"):
-            try:
-                processes[node].wait(max(deadline - time.monotonic(), 1))
-            except subprocess.TimeoutExpired:
-                raise FracAccelError(f"the {node} did not finish within {_PATIENCE_S} s") from None
-            if processes[node].returncode:
-                output = processes[node].stdout.read().strip().splitlines() or ["no word"]
-                raise FracAccelError(f"the {node} failed: {output[-1]}")
+            _wait_for(lambda node=node: processes[node].poll() is not None, processes, logs,
+                      deadline)
     finally:
         for process in processes.values():
             if process.poll() is None:
@@ -153,6 +153,21 @@ def _live(bag, model_file, recorded):
                 process.wait(10)
             except subprocess.TimeoutExpired:
                 process.kill()
+
+
+def _wait_for(condition, processes, logs, deadline):
+    """Wait, while no process has failed."""
+    while True:
+        done = condition()
+        for node, process in processes.items():
+            if process.poll():
+                words = logs[node].read_text(encoding="utf-8").strip().splitlines() or ["no word"]
+                raise FracAccelError(f"the {node} failed: {words[-1]}")
+        if done:
+            return
+        if time.monotonic() > deadline:
+            raise FracAccelError(f"not finished within {_PATIENCE_S} s; see {logs['recorder']}")
+        time.sleep(0.05)
 
 
 if __name__ == "__main__":
