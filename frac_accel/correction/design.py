@@ -8,7 +8,7 @@ import numpy as np
 from ..core import Arx
 from ..errors import DesignError, FracAccelError
 from ..model import AXES
-from .filter import ParallelFilter
+from .fitting import LOWEST_SHARE, FilterProblem, evaluate
 
 # A band ends where the sensor's gain has fallen to this share of its reference gain: the inverse
 # multiplies the noise there by five. At the latest it ends at 0.6 of the Nyquist frequency.
@@ -18,49 +18,6 @@ NYQUIST_SHARE = 0.6
 TOLERANCE = 2e-3
 # Without a permitted delay: the shortest whose noise gain is this close to that of a brick wall.
 NOISE_EXCESS = 1.3
-# Lowest frequency [of the sampling rate] that is told from zero: at 2 kHz a period of six days.
-LOWEST_SHARE = 1e-9
-# Below the band of a sensor with a high-pass: gain, as a multiple of that at the band's edge, at
-# which the rise weighs as much as the permitted error does in the band.
-MOST_RISE = 30
-# Taps after the delay, in periods of the highest frequency: with them a filter of short delay is as
-# accurate as one of long delay, and far less noisy than with as many taps after as before.
-TAIL = 4
-# Delay, in periods of the highest frequency or of its distance from the Nyquist frequency, beyond
-# which a filter gains nothing.
-_LONGEST = 8
-# Relative change of a response from that at zero that is none.
-STATIC = 5e-4
-_MOST_TAPS = 4096
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class DesignedFilter:
-    """A filter for one axis with what it is worth.
-
-    Attributes
-    ----------
-    filter : ParallelFilter
-    sampling_rate_hz : float
-    band_hz : tuple of float
-        Lowest and highest frequency [Hz] for which the errors hold.
-    delay_s : float
-        Delay of the filter alone [s].
-    amplitude_error : float
-        Worst relative amplitude error in the band.
-    phase_error_deg : float
-        Worst phase error in the band [degree], its delay taken out.
-    noise_gain : float
-        Standard deviation of the output per standard deviation of white input noise.
-    """
-
-    filter: ParallelFilter
-    sampling_rate_hz: float
-    band_hz: tuple
-    delay_s: float
-    amplitude_error: float
-    phase_error_deg: float
-    noise_gain: float
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -165,7 +122,7 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
 
     @functools.cache
     def problem(axis, band):
-        return _Problem(lambda s: 1 / axis.transfer_function(s), axis.zeros(), rate, band,
+        return FilterProblem(lambda s: 1 / axis.transfer_function(s), axis.zeros(), rate, band,
                         max(0.0, sensor_delay_ns * 1e-9 - axis.delay_s) * rate)
 
     problems = [problem(axis, band) for axis, band in zip(model.axes, bands)]
@@ -203,7 +160,7 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
 
     @functools.cache
     def problem(axis):
-        return _Problem(axis.transfer_function, axis.poles(), rate,
+        return FilterProblem(axis.transfer_function, axis.poles(), rate,
                         (0.0, NYQUIST_SHARE * rate / 2), axis.delay_s * rate + wait,
                         floor=0.01 * reference_gain(axis))
 
@@ -212,191 +169,6 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
     return FilterDesign(model=model, sampling_rate_hz=rate,
                         axes=tuple(p.solve(delay, tolerance) for p in problems),
                         delay_samples=delay + wait, sensor_delay_ns=0)
-
-
-class _Problem:
-    """Least-squares fit of a filter with given poles to a target response.
-
-    Parameters
-    ----------
-    target : callable
-        Wanted response at complex s, without delay.
-    slow_or_resonant : ndarray
-        Poles [rad/s] of the target, which the filter takes over where they are stable.
-    rate, band : float, tuple
-    extra_delay : float
-        Delay [samples] that this axis's target has beyond the common one.
-    floor : float
-        Size of the target below which errors are relative to it.
-    """
-
-    def __init__(self, target, poles_s, rate, band, extra_delay, floor=0.0):
-        self.rate, self.band = rate, band
-        self.lead = int(extra_delay)
-        self.extra_delay = extra_delay - self.lead
-        low, high = band
-        self.poles_s = poles_s
-        self.response, self.floor = target, floor
-        self.longest = min(_MOST_TAPS // 2,
-                           int(np.ceil(_LONGEST * rate / min(high, rate / 2 - high))))
-        self.grid = _band_grid(band, rate, poles_s, self.longest)
-        self.check = _refined(self.grid)
-        self.target = _evaluate(target, self.grid, rate)
-        self.check_target = _evaluate(target, self.check, rate)
-        edge = min(6 * high, rate / 2)
-        above = np.unique(np.r_[np.linspace(high, edge, 200), np.linspace(edge, rate / 2, 150)])
-        below = np.linspace(0, low, 60) if low else np.empty(0)
-        self.outside = np.r_[below, above]
-        spacing = np.r_[np.gradient(below) if low else below, np.gradient(above)]
-        # root mean square over all frequencies: with it the noise gain is a fraction of this
-        self.scale = np.sqrt(np.mean(np.abs(self.target)**2))
-        self.outside_weight = np.sqrt(spacing / (rate / 2)) / self.scale
-        linear = np.linspace(low, high, 2000)
-        gain = np.abs(_evaluate(target, linear, rate))
-        self.ideal_noise_gain = np.sqrt(np.mean(gain**2) * (high - low) / (rate / 2))
-        self._solved = {}
-
-    def solve(self, delay, tolerance):
-        """Least noisy DesignedFilter within `tolerance`; with the smallest error if none is."""
-        # another axis may need more delay than this one can use
-        wait = max(0, delay - self.longest)
-        case = delay - wait, tolerance
-        if case not in self._solved:
-            self._solved[case] = self._solve(*case)
-        design = self._solved[case]
-        if not wait:
-            return design
-        return dataclasses.replace(
-            design, delay_s=design.delay_s + wait / self.rate,
-            filter=dataclasses.replace(design.filter, lead=design.filter.lead + wait))
-
-    def _solve(self, delay, tolerance):
-        taps, poles = self._structure(delay)
-        low = self.band[0]
-        shift = delay + self.extra_delay
-        inside = self._columns(self.grid, taps, poles)
-        inside *= (np.exp(2j * np.pi * self.grid * shift / self.rate)
-                   / self._unit(self.target))[:, None]
-        # the fit is worst where a high-pass's band begins: there an error weighs more
-        weight = np.sqrt((1 + 4 * (low / np.maximum(self.grid, 1e-300))**2) / len(self.grid))
-        inside *= weight[:, None]
-        outside = self._columns(self.outside, taps, poles) * self.outside_weight[:, None]
-        wanted = weight * np.abs(self.target / self._unit(self.target))
-        if low:
-            # below a high-pass's band the inverse may rise, but not without end
-            below = np.linspace(0, low, 20)
-            rise = MOST_RISE * np.abs(self.target[0]) / tolerance
-            inside = np.r_[inside, self._columns(below, taps, poles) / (rise * np.sqrt(len(below)))]
-            wanted = np.r_[wanted, np.zeros(len(below))]
-        # orthogonal reduction once; each noise weight then solves a small system
-        basis, triangle = np.linalg.qr(_real(inside))
-        right = basis.T @ np.r_[wanted, np.zeros(len(wanted))]
-        noise = np.linalg.qr(_real(outside), mode="r")
-        check = self._columns(self.check, taps, poles)
-        check *= (np.exp(2j * np.pi * self.check * shift / self.rate)
-                  / self._unit(self.check_target))[:, None]
-        right_size = np.abs(self.check_target / self._unit(self.check_target))
-
-        def fit(noise_weight):
-            matrix = np.r_[triangle, noise_weight * noise]
-            scale = np.linalg.norm(matrix, axis=0)
-            unknowns = np.linalg.lstsq(matrix / scale, np.r_[right, np.zeros(len(noise))],
-                                       rcond=1e-13)[0] / scale
-            return unknowns, check @ unknowns
-
-        quiet, loud = -6.0, 2.0
-        best, response = fit(10.0**quiet)
-        if np.max(np.abs(response - right_size)) <= tolerance:
-            while loud - quiet > 0.1:
-                middle = (quiet + loud) / 2
-                unknowns, trial = fit(10.0**middle)
-                if np.max(np.abs(trial - right_size)) <= tolerance:
-                    quiet, best, response = middle, unknowns, trial
-                else:
-                    loud = middle
-        result = self._filter(best, taps, poles)
-        phase = np.angle(response)
-        return DesignedFilter(
-            filter=result, sampling_rate_hz=self.rate, band_hz=self.band,
-            delay_s=(shift + self.lead) / self.rate,
-            amplitude_error=float(np.max(np.abs(np.abs(response) - right_size))),
-            phase_error_deg=float(np.degrees(np.max(np.abs(phase[right_size > 0.999])))),
-            noise_gain=result.noise_gain)
-
-    def _unit(self, target):
-        """What errors are relative to: the target, made no smaller than the floor."""
-        return target * np.maximum(1.0, self.floor / np.abs(target))
-
-    def _structure(self, delay):
-        """Basis of the taps, and the poles in z."""
-        low, high = self.band
-        before = np.ceil(delay + self.extra_delay)
-        count = int(before + max(before, np.ceil(TAIL * self.rate / high))) + 2
-        step = max(1, int(self.rate / (8 * high)))
-        taps = _SmoothTaps.of_length(max(count, 4), step)
-        # decays that the taps alone would cut off too early
-        memory = min(5 * self.rate / (np.pi * taps.length), 0.15 * self.rate)
-        poles_s = [p for p in self.poles_s if p.real < 0 and abs(p) < np.pi * self.rate]
-        lowest = low / 20 if low else self._slowest() / 10
-        real = [p.real for p in poles_s if not p.imag]
-        slow = []
-        if self._has_memory() and lowest < memory:
-            # evenly in log frequency around the slowest real pole: the memory's density has a
-            # pole there, too, and is summed rightly only if the two sides are alike
-            centre = -max(real, default=-2 * np.pi * memory) / (2 * np.pi)
-            steps = np.arange(np.floor(2.5 * np.log10(lowest / centre)),
-                              np.ceil(2.5 * np.log10(memory / centre)) + 1)
-            slow = -2 * np.pi * centre * 10**(steps[(steps != 0) | (not real)] / 2.5)
-        pairs = [q for p in poles_s if p.imag > 0 for q in (p, np.conj(p))]
-        # A section takes two poles: the conjugate pairs, then the slowest with the fastest (of two
-        # slow ones, rounding would spoil the product of 1 - p), an odd one at the end.
-        real = np.sort(np.r_[real, slow])
-        order = np.stack([np.arange(len(real)), np.arange(len(real))[::-1]], axis=1).ravel()
-        return taps, np.exp(np.r_[pairs, real[order[:len(real)]]].astype(complex) / self.rate)
-
-    def _slowest(self):
-        """Frequency [Hz] below which the target is as at zero."""
-        frequency = np.geomspace(LOWEST_SHARE * self.rate, self.band[1], 500)
-        target = _evaluate(self.response, np.r_[0, frequency], self.rate)
-        change = np.abs(target[1:] - target[0]) / max(np.abs(target[0]), self.floor)
-        return frequency[np.argmax(change > STATIC)]
-
-    def _has_memory(self):
-        """Whether the target still varies at frequencies that the taps cannot resolve."""
-        if self.band[0]:
-            return True
-        slow = self.grid < 0.02 * self.band[1]
-        target = self.target[slow]
-        # what a smooth response (a polynomial in s) would do down there is taken out
-        s = 1j * self.grid[slow] / self.band[1]
-        smooth = np.stack([s**0, s, s**2], axis=1)
-        fit = np.linalg.lstsq(_real(smooth), np.r_[target.real, target.imag], rcond=None)[0]
-        return bool(np.max(np.abs(target - smooth @ fit)) > 1e-5 * np.max(np.abs(target)))
-
-    def _columns(self, frequency, taps, poles):
-        z = np.exp(-2j * np.pi * frequency / self.rate)
-        columns = [taps.columns(z)]
-        for pole in poles:
-            if not pole.imag:
-                columns.append(((1 - pole) / (1 - pole * z))[:, None])
-            elif pole.imag > 0:
-                section = abs(1 - pole)**2 / ((1 - pole * z) * (1 - np.conj(pole) * z))
-                columns.append(np.stack([section, section * z], axis=1))
-        return np.concatenate(columns, axis=1)
-
-    def _filter(self, unknowns, taps, poles):
-        rest = iter(unknowns[taps.unknowns:])
-        residues = []
-        for pole in poles:
-            if not pole.imag:
-                residues.append((1 - pole) * next(rest))
-            elif pole.imag > 0:
-                scale = abs(1 - pole)**2
-                numerator = scale * (next(rest) + next(rest) / pole)
-                residue = numerator * pole / (pole - np.conj(pole))
-                residues += [residue, np.conj(residue)]
-        return ParallelFilter(taps.taps(unknowns[:taps.unknowns]), poles,
-                              np.array(residues, complex), self.lead)
 
 
 def _choose_delay(problems, rate, max_delay_s, tolerance):
@@ -459,41 +231,6 @@ def _rounded_up(value, digits):
     return f"{np.ceil(value / unit * (1 - 1e-12)) * unit:.{digits}g}"
 
 
-@dataclasses.dataclass(frozen=True)
-class _SmoothTaps:
-    """Few unknowns for about `count` taps that vary slowly: cubic B-splines `step` taps apart.
-
-    A response that ends far below the sampling rate needs no more; with step 1 these are the taps.
-    """
-
-    unknowns: int
-    step: int
-
-    @classmethod
-    def of_length(cls, count, step):
-        return cls(max(4, int(np.ceil((count - 4 * step + 3) / step)) + 1), step)
-
-    @property
-    def length(self):
-        return (self.unknowns + 3) * self.step - 3
-
-    def kernel(self):
-        kernel = np.ones(1)
-        for _ in range(4):
-            kernel = np.convolve(kernel, np.ones(self.step) / self.step)
-        return kernel
-
-    def columns(self, z):
-        """Response of each unknown at z**-1 = `z`, shape (len(z), unknowns)."""
-        shape = np.polyval(self.kernel(), z)
-        return shape[:, None] * np.vander(z**self.step, self.unknowns, increasing=True)
-
-    def taps(self, unknowns):
-        spread = np.zeros((self.unknowns - 1) * self.step + 1)
-        spread[::self.step] = unknowns
-        return np.convolve(spread, self.kernel())
-
-
 def _positive(value, name):
     if not isinstance(value, (int, float, np.number)) or not np.isfinite(value) or value <= 0:
         raise FracAccelError(f"{name}: {value!r} given, expected a number above 0")
@@ -509,7 +246,7 @@ def _band(axis, name, rate, bandwidth_hz, lowest_hz, known_hz):
     if not reference > 0:
         raise DesignError(f"axis {name}: the model's gain is zero, there is nothing to invert")
     grid = np.geomspace(0.1 * LOWEST_SHARE * rate, NYQUIST_SHARE * top, 8000)
-    usable = np.abs(_evaluate(axis.transfer_function, grid, rate)) >= GAIN_AT_BAND_EDGE * reference
+    usable = np.abs(evaluate(axis.transfer_function, grid, rate)) >= GAIN_AT_BAND_EDGE * reference
     if bandwidth_hz is not None and bandwidth_hz >= 0.95 * top:
         raise DesignError(f"bandwidth_hz: {bandwidth_hz:g} given, expected below {0.95 * top:g} "
                           f"(0.95 of the Nyquist frequency)")
@@ -532,32 +269,3 @@ def reference_gain(axis):
     """Gain of an axis on its plateau [output units per m/s²]."""
     links = (axis.effective_core, *axis.effects)
     return float(np.prod([link.reference_gain() for link in links]))
-
-
-def _band_grid(band, rate, poles_s, delay):
-    low, high = band
-    # four points for each ripple that the taps can make
-    grid = [np.linspace(low, high, max(300, int(8 * delay * high / rate))),
-            np.geomspace(max(low, LOWEST_SHARE * rate), high, 200)]
-    for pole in poles_s:
-        centre, width = abs(pole.imag) / (2 * np.pi), abs(pole.real) / (2 * np.pi)
-        if width < 0.1 * centre:
-            grid.append(centre + width * np.linspace(-6, 6, 25))
-    grid = np.unique(np.concatenate(grid))
-    return grid[(grid >= low) & (grid <= high)]
-
-
-def _refined(grid):
-    """The grid with three points more in each of its gaps, except beside zero."""
-    gaps = grid[np.flatnonzero(grid)[0]:]
-    between = [gaps[:-1] + share * np.diff(gaps) for share in (0.25, 0.5, 0.75)]
-    return np.unique(np.concatenate([grid, *between]))
-
-
-def _evaluate(target, frequency, rate):
-    """Target on a grid of frequencies [Hz]; at zero, its limit."""
-    return target(2j * np.pi * np.maximum(frequency, 1e-6 * LOWEST_SHARE * rate))
-
-
-def _real(matrix):
-    return np.concatenate([matrix.real, matrix.imag])
