@@ -126,11 +126,13 @@ def _smooth_at_nyquist(response):
     Anything else there jumps to its conjugate, and the jump rings through the record from both its
     ends with an amplitude that falls only as 1/n.
     """
-    share = np.linspace(0, 1, len(response))
-    ramp = np.clip((share - 0.8) / 0.2, 0, 1)
+    first = int(0.8 * len(response))
+    ramp = np.linspace(0, 1, len(response) - first)
     angle = np.angle(response[-1])
     excess = angle - np.round(angle / np.pi) * np.pi
-    return response * np.exp(-1j * excess * ramp * ramp * (3 - 2 * ramp))
+    smooth = response.copy()
+    smooth[first:] *= np.exp(-1j * excess * ramp * ramp * (3 - 2 * ramp))
+    return smooth
 
 
 def static_gain(model):

@@ -14,6 +14,7 @@ from ..model import AXES, SensorModel
 from ..pair import Pair, load_pair
 from ..parameters import parameter_fields, unit_of
 from ..simulation import simulate
+from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
 from .excitation import excited_band, require_excitation
 from .output_error import Fit, fit_output_error
 from .structures import FractionalStructure, OscillatorStructure
@@ -26,7 +27,8 @@ _LEARN = 0.6
 _UNDETERMINED = 0.2
 # Standard uncertainties by which the damping order must differ from 1 to be called fractional.
 _SIGNIFICANT = 3.0
-_STRUCTURES = {"oscillator": OscillatorStructure(), "fractional": FractionalStructure()}
+_STRUCTURES = {"arx": ArxStructure(), "oscillator": OscillatorStructure(),
+               "fractional": FractionalStructure()}
 STRUCTURES = ("auto", *_STRUCTURES)
 
 
@@ -74,10 +76,10 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None):
     pair : Pair, str or Path
         A measured pair, or a bag with one on the default topics.
     axis : {"x", "y", "z"}
-    structure : {"auto", "oscillator", "fractional"}
-        Classical seismic sensor, one with a damping of free order, or the choice between the two:
-        the fractional one only where its order differs from 1 by three standard uncertainties and
-        it predicts held-out data better.
+    structure : {"auto", "arx", "oscillator", "fractional"}
+        Rational transfer function in z, classical seismic sensor, one with a damping of free
+        order, or the choice between the last two: the fractional one only where its order differs
+        from 1 by three standard uncertainties and it predicts held-out data better.
     provenance : dict, optional
         Where the data come from; becomes part of the model.
     progress : callable, optional
@@ -119,9 +121,11 @@ class _Data:
         return cls(pair, pair.reference[:, column], sensor, float(np.std(sensor)), progress)
 
     def fit(self, structure, part=slice(None), start=None):
-        return fit_output_error(structure, self.reference[part], self.sensor[part],
-                                self.pair.sampling_rate_hz, self.pair.valid[part],
-                                self.pair.lag_s, start)
+        record = (self.reference[part], self.sensor[part], self.pair.sampling_rate_hz,
+                  self.pair.valid[part], self.pair.lag_s, start)
+        if isinstance(structure, ArxStructure):
+            return fit_arx(*record)
+        return fit_output_error(structure, *record)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,14 +134,15 @@ class _Candidate:
 
     structure: object
     name: str
-    fit: Fit
+    fit: Fit | ArxFit
     nrmse: float
     held_out_nrmse: float
 
     @classmethod
     def of(cls, name, data):
         structure = _STRUCTURES[name]
-        require_excitation(data.reference, data.pair.sampling_rate_hz, len(structure.names) + 2)
+        require_excitation(data.reference, data.pair.sampling_rate_hz,
+                           max(len(structure.names) + 2, FEWEST_COEFFICIENTS))
         data.progress(f"fitting the {name} structure")
         fit = data.fit(structure)
         data.progress(f"judging the {name} structure on held-out data")
@@ -182,6 +187,8 @@ def _identification(chosen, reason, data, axis, provenance):
         "provenance": {"axis": axis, "structure": chosen.name, "reason": reason, **provenance},
         "validation": {"nrmse": chosen.nrmse, "held_out_nrmse": chosen.held_out_nrmse,
                        "notes": notes},
+        **({"continuous_equivalent": fit.continuous_equivalent()}
+           if isinstance(fit, ArxFit) else {}),
     })
     return Identification(model, chosen.name, reason, parameters, chosen.nrmse,
                           chosen.held_out_nrmse, notes)
@@ -189,6 +196,8 @@ def _identification(chosen, reason, data, axis, provenance):
 
 def _unit(name):
     """Unit of a parameter, from the class that declares it."""
+    if name[1:].isdigit():
+        return {"a": "1", "b": unit_of(Oscillator, "sensitivity")}[name[0]]
     return next(unit_of(cls, name) for cls in (Oscillator, TimeDelay, Offset)
                 if name in (field.name for field in parameter_fields(cls)))
 
@@ -224,11 +233,28 @@ def _held_out(structure, fit, data):
     simulated = simulate(model, data.reference, pair.sampling_rate_hz, axis="x", initial="steady")
     error = (data.sensor - simulated)[rest][pair.valid[rest]]
     spread = np.std(data.sensor[rest][pair.valid[rest]])
-    return float(np.sqrt(np.mean(error**2)) / spread) if spread > 0 else float("nan")
+    # without its mean: motion long before the record still shows there as a constant
+    return float(np.std(error) / spread) if spread > 0 else float("nan")
 
 
 def _notes(parameters, chosen, data, highest):
     fit, pair, nrmse, held_out = chosen.fit, data.pair, chosen.nrmse, chosen.held_out_nrmse
+    notes = fit.notes() if isinstance(fit, ArxFit) else _seismic_notes(parameters, chosen, highest)
+    noise = _noise(fit.residual)
+    if nrmse > 1e-3 and fit.rmse > 3 * noise:
+        notes.append(f"the model leaves {nrmse:.2%} of the output unexplained, while its white "
+                     f"noise is {noise / data.spread:.2%}: something real is missing from it")
+    if np.isfinite(held_out) and held_out > max(2 * nrmse, 1e-3):
+        notes.append(f"held-out data are predicted worse ({held_out:.2%}) than the fitted "
+                     f"({nrmse:.2%})")
+    missing = int(np.sum(~pair.valid))
+    if missing:
+        notes.append(f"{missing} of {len(pair)} instants have no sample in one of the topics")
+    return notes
+
+
+def _seismic_notes(parameters, chosen, highest):
+    """What the data leave open of an oscillator."""
     notes = []
     for name in ("sensitivity", *chosen.structure.names):
         entry = parameters[name]
@@ -241,14 +267,4 @@ def _notes(parameters, chosen, data, highest):
     if highest < resonance / 3:
         notes.append(f"the excitation ends at {highest:.4g} Hz, far below the resonance at "
                      f"{resonance:.4g} Hz; the model holds only up to there")
-    noise = _noise(fit.residual)
-    if nrmse > 1e-3 and fit.rmse > 3 * noise:
-        notes.append(f"the model leaves {nrmse:.2%} of the output unexplained, while its white "
-                     f"noise is {noise / data.spread:.2%}: something real is missing from it")
-    if np.isfinite(held_out) and held_out > max(2 * nrmse, 1e-3):
-        notes.append(f"held-out data are predicted worse ({held_out:.2%}) than the fitted "
-                     f"({nrmse:.2%})")
-    missing = int(np.sum(~pair.valid))
-    if missing:
-        notes.append(f"{missing} of {len(pair)} instants have no sample in one of the topics")
     return notes

@@ -17,6 +17,8 @@ _ITERATIONS = 60
 _SMALL_STEP = 1e-3
 _IMPROVEMENTS = 25
 _SEARCHES = 2
+# Error of a start on the averaged response, over the best one's, with which it leads nowhere.
+_HOPELESS = 1.5
 _START_LENGTH = 8192
 _TRIAL_ITERATIONS = 4
 # Share of the output's power, times the number of independent frequencies, that the best of all
@@ -162,15 +164,16 @@ class _Problem:
         shared = np.real(np.conj(models) @ turned)
         explained = shared**2 / (np.abs(models)**2 @ weight)[:, None]
         held = [name in self.structure.held for name in self.structure.names]
+        best_delay = np.argmax(explained, axis=1)
+        explained = np.max(explained, axis=1)
         chosen, seen = [], {}
-        for flat in np.argsort(explained, axis=None)[::-1]:
-            point, delay = divmod(int(flat), len(delays))
+        for point in np.argsort(explained)[::-1]:
             # neighbours in frequency end in the same place; other dampings may not
             kind = *np.round(grid[point][1:], 3), round(grid[point][0], 1)
             group = seen.setdefault(tuple(grid[point][held]), set())
             if kind not in group and len(group) < self.structure.starting_points:
                 group.add(kind)
-                chosen.append(np.r_[grid[point], delays[delay]])
+                chosen.append(np.r_[grid[point], delays[best_delay[point]]])
         improved = [self.improve(theta, s, prepared, response, np.sqrt(weight))
                     for theta in chosen]
         # half a period of the resonance, with the other polarity, looks much the same
@@ -181,10 +184,15 @@ class _Problem:
         improved.sort(key=lambda pair: pair[0])
         lag = bulk + self.lag_s * self.rate
         best = {}
-        for _, theta in improved:
+        hopeless = _HOPELESS * improved[0][0]
+        for cost, theta in improved:
+            if cost > hopeless and not any(held):
+                break
             group = best.setdefault(tuple(theta[:-1][held]), [])
-            if len(group) < self.structure.searches:
-                group.append(np.r_[theta[:-1], theta[-1] + lag])
+            start = np.r_[theta[:-1], theta[-1] + lag]
+            known = any(np.max(np.abs(start - other)) < 0.05 for other in group)
+            if len(group) < self.structure.searches and not known:
+                group.append(start)
         return [theta for group in best.values() for theta in group]
 
     def improve(self, theta, s, prepared, response, weight):
