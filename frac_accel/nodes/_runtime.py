@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 import signal
 import sys
 import time
@@ -104,7 +105,7 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
     0, or 2 after one line on stderr that says what is wrong.  The first signal ends the node in
     order (`FracAccelNode.finish`), a second one at once.
     """
-    program = make_node.__name__.lower()
+    program = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", make_node.__name__).lower()
     node = executor = None
     stop = _StopSignals()
     try:
