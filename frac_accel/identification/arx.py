@@ -7,6 +7,8 @@ from scipy.signal import lfilter
 
 from ..core import Arx
 from ..errors import IdentificationError
+from .continuous_poles import METHOD, continuous_poles
+from .excitation import persistent_excitation
 from .frequency_response import bulk_delay
 from .uncertainty import sandwich
 
@@ -19,14 +21,20 @@ FEWEST_COEFFICIENTS = 4
 _LONG_POLES = 16
 _LONG_INPUTS = 24
 _ITERATIONS = 60
-_SCAN_ITERATIONS = 4
-# A step that gains this share of one sample's noise changes nothing that the data can tell.
+_SCAN_ITERATIONS = 8
+_TRIAL_ITERATIONS = 20
+# A step that gains this share of one sample's noise changes nothing that the data can tell; for the
+# choice of orders, which weighs gains of several samples' noise, less will do.
 _SMALL_GAIN = 1e-7
+_SMALL_GAIN_OF_TRIAL = 3e-2
 # The strongest stretch of a long record [samples] is enough to choose orders on.
 _CHOICE_LENGTH = 16384
 _LEARN = 0.6
-# Standard errors by which a larger model must predict held-out data better.
-_BETTER = 2.0
+# Standard errors by which a larger model must predict held-out data better. What a model lacks is
+# not in its uncertainty, while what it has too much is: the test is mild.
+_BETTER = 1.0
+# The same against a constant: below, chance alone finds one among all orders and delays.
+_RELATED = 5.0
 _BLOCKS = 32
 
 
@@ -58,6 +66,8 @@ class ArxFit:
         Orders and coefficients, to start another fit from.
     orders : Orders
     sampling_rate_hz : float
+    lag_s : float
+        Part of the delay that the stamps have, not the samples.
     """
 
     names: tuple
@@ -67,6 +77,7 @@ class ArxFit:
     unknowns: tuple
     orders: Orders
     sampling_rate_hz: float
+    lag_s: float
 
     @property
     def std(self):
@@ -90,8 +101,42 @@ class ArxFit:
                    tuple(np.pad(np.r_[1, a], (0, degree - len(a))).tolist()),
                    self.sampling_rate_hz)
 
+    def continuous_equivalent(self):
+        """Method of the mapping to s, and the oscillators that it gives (`continuous_poles`)."""
+        count = self.orders.poles
+        return {"method": METHOD,
+                "poles": continuous_poles(np.r_[1, self.values[:count]],
+                                          self.covariance[:count, :count], self.sampling_rate_hz)}
 
-def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=None, most=None):
+    def notes(self):
+        """What a user must know of orders, delay and meaning of the coefficients."""
+        orders = self.orders
+        stamps = f" and the {self.lag_s:.3g} s by which the sensor's stamps are later than the " \
+                 "reference's" if abs(self.lag_s) * self.sampling_rate_hz > 1e-3 else ""
+        pairs = [f"{pair['natural_frequency_hz']['value']:.5g} +- "
+                 f"{pair['natural_frequency_hz']['std']:.2g} Hz with damping ratio "
+                 f"{pair['damping_ratio']['value']:.4g} +- {pair['damping_ratio']['std']:.2g}"
+                 for pair in self.continuous_equivalent()["poles"]]
+        return [
+            f"{orders.poles} pole(s) and {orders.inputs} numerator coefficient(s), chosen by BIC "
+            "and on held-out data; the uncertainties hold given these orders",
+            f"delay_s is {orders.delay} whole sample(s){stamps}, chosen and not estimated; a "
+            "fraction of a sample that is the sensor's own is approximated by the numerator",
+            f"the coefficients hold in z at {self.sampling_rate_hz:.6g} Hz only; in s the model "
+            f"has {'; '.join(pairs) or 'no oscillating poles'} ({METHOD})"]
+
+
+class ArxStructure:
+    """Rational transfer function in z; its orders belong to each fit."""
+
+    names = ()
+
+    def core(self, fit):
+        """Core of a sensor model."""
+        return fit.core()
+
+
+def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=None):
     r"""Coefficients of a rational transfer function in z, with a whole delay and an offset.
 
     Minimises the sum of the squared differences between the measured output and
@@ -122,8 +167,6 @@ def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=No
         Time by which the sensor's instants are later than the reference's.
     start : tuple, optional
         `ArxFit.unknowns` of a fit whose orders are to be kept.
-    most : int, optional
-        Most coefficients that the excitation allows, where orders are to be chosen.
 
     Returns
     -------
@@ -133,9 +176,16 @@ def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=No
     ------
     IdentificationError
         If no model predicts held-out data better than a constant does, or the record is too short.
+
+    Notes
+    -----
+    Orders, where `start` does not give them, are chosen by BIC and on held-out data among up to
+    `MOST_POLES` poles and `MOST_ZEROS` zeros, with no more coefficients than the excitation is
+    persistently exciting of.
     """
     valid = np.ones(len(sensor), bool) if valid is None else valid
     if start is None:
+        most = persistent_excitation(reference, sampling_rate_hz)[0]
         start = _choose(*_strongest(reference, sensor, valid), most)
     orders, coefficients = start
     record = _Record(reference, sensor, valid, orders)
@@ -167,14 +217,14 @@ def _strongest(reference, sensor, valid):
 def _choose(reference, sensor, valid, most):
     """Orders and coefficients to start from.
 
-    All orders are fitted to the first part of the record. In the order of their number of
-    coefficients, a model replaces a smaller one only if its BIC is lower and it predicts the rest
-    of the record better by two standard errors: BIC alone takes what a coloured residual pretends.
+    All orders are fitted to the first part of the record. By growing number of coefficients, a
+    model replaces a smaller one only if its BIC is lower and it predicts the rest of the record
+    better by a standard error: BIC alone takes what a coloured residual pretends.
     """
     if len(sensor) < 20 * (MOST_POLES + MOST_ZEROS):
         raise IdentificationError(f"the record has {len(sensor)} samples, expected at least "
                                   f"{20 * (MOST_POLES + MOST_ZEROS)} to choose orders on")
-    most = min(most or np.inf, MOST_POLES + MOST_ZEROS + 1)
+    most = min(most, MOST_POLES + MOST_ZEROS + 1)
     bulk = bulk_delay(reference, sensor)
     reach = min(_LONG_INPUTS, len(sensor) // 20)
     window = Orders(0, 0, bulk - reach), Orders(_LONG_POLES, 2 * reach, bulk - reach)
@@ -190,50 +240,65 @@ def _choose(reference, sensor, valid, most):
     scanned = [_Trial.of(record, Orders(poles, inputs, delay), learn, long_output,
                          _SCAN_ITERATIONS)
                for delay in range(bulk - reach, bulk + 3)]
-    earliest = min(scanned, key=lambda trial: trial.bic).orders.delay
+    # the first coefficients may be nought: of the delays that do equally well, the longest
+    enough = min(trial.bic for trial in scanned) + np.log(record.rows)
+    earliest = max(trial.orders.delay for trial in scanned if trial.bic <= enough)
     trials = [_Trial.of(record, Orders(poles, inputs, earliest + wait), learn, long_output)
               for poles in range(1, MOST_POLES + 1)
               for inputs in range(1, MOST_ZEROS + 2)
               for wait in range(MOST_ZEROS + 2 - inputs)
               if poles + inputs <= most]
-    best = _Trial(Orders(0, 0, 0), None, np.inf, record.centred())
-    for trial in sorted(trials, key=lambda trial: (trial.orders.coefficients, trial.bic)):
-        same = trial.orders.coefficients == best.orders.coefficients
-        if trial.bic < best.bic and (same or _better(trial.error, best.error, record.valid, learn)):
+    constant = _Trial(Orders(0, 0, 0), np.zeros(0), np.inf, np.inf, record.centred())
+    best = constant
+    for trial in sorted(trials, key=lambda trial: (trial.orders.coefficients, trial.overall)):
+        larger = trial.orders.coefficients > best.orders.coefficients
+        if larger and trial.bic < best.bic \
+                and _gain(trial.error, best.error, learn) > _BETTER:
             best = trial
-    if best.theta is None:
+    if best is constant or _gain(best.error, constant.error, learn) < _RELATED:
         raise IdentificationError(
-            "the sensor's output has nothing to do with the reference: no transfer function of up "
-            f"to {MOST_POLES} poles predicts held-out data better than a constant does")
+            f"no transfer function of up to {MOST_POLES} poles predicts the held-out end of the "
+            "record better than a constant does: the sensor's output has nothing to do with the "
+            "reference, or its motion (a shock) ends before")
     return best.orders, best.theta[:best.orders.coefficients]
 
 
 @dataclasses.dataclass(frozen=True)
 class _Trial:
-    """A model fitted to the learning part, with its error over all rows."""
+    """A model fitted to the learning part, with its error over all rows.
+
+    `overall` is its BIC with the log-likelihood of the rest added: between equally large models.
+    """
 
     orders: Orders
     theta: np.ndarray
     bic: float
+    overall: float
     error: np.ndarray
 
     @classmethod
-    def of(cls, record, orders, learn, long_output, iterations=_ITERATIONS):
+    def of(cls, record, orders, learn, long_output, iterations=_TRIAL_ITERATIONS):
         problem = record.problem(orders, learn)
         start = problem.instrumental(long_output)
-        theta, cost = problem.search(start[:orders.coefficients], iterations)
+        theta, cost = problem.search(start[:orders.coefficients], iterations,
+                                     _SMALL_GAIN_OF_TRIAL)
         count = problem.used.sum()
         bic = count * np.log(cost / count) + (orders.coefficients + 1) * np.log(count)
         whole = record.problem(orders)
-        return cls(orders, theta, bic, whole.sensor - whole.simulate(theta)[0])
+        error = np.where(whole.used, whole.sensor - whole.simulate(theta)[0], 0.0)
+        rest = whole.used[learn.stop:].sum()
+        overall = bic + rest * np.log(np.sum(error[learn.stop:]**2) / rest)
+        return cls(orders, theta, bic, overall, error)
 
 
-def _better(error, other, valid, learn):
-    """Whether one error is smaller than another on the rows after those learnt from."""
+def _gain(error, other, learn):
+    """By how many standard errors `error` is smaller than `other` on the rows not learnt from."""
     rest = slice(learn.stop, None)
-    gain = np.where(valid, other**2 - error**2, 0.0)[rest]
-    blocks = np.array([block.mean() for block in np.array_split(gain, _BLOCKS)])
-    return blocks.mean() > _BETTER * blocks.std(ddof=1) / np.sqrt(_BLOCKS)
+    energy = np.cumsum(other[rest]**2 + error[rest]**2)
+    # blocks of equal energy: the rest of a shock is a few strong samples and a long quiet
+    edges = np.unique(np.searchsorted(energy, np.arange(_BLOCKS) / _BLOCKS * energy[-1]))
+    blocks = np.add.reduceat((other**2 - error**2)[rest], edges)
+    return blocks.mean() / max(blocks.std(ddof=1) / np.sqrt(len(blocks)), 1e-300)
 
 
 class _Record:
@@ -297,18 +362,25 @@ class _Problem:
         denominator = np.r_[1, a]
         return lfilter([1], denominator, right), denominator
 
-    def columns(self, output, denominator=None):
-        """Derivatives of the model by theta where its output is `output`, shape (rows, p)."""
-        signals = np.concatenate([-output[None], self.inputs, np.zeros((1, self.rows))])
+    def slopes(self, output, denominator=None):
+        """Derivatives of the model by theta where its output is `output`, shape (p, rows)."""
+        signals = np.concatenate([self.inputs, np.zeros((1, self.rows))])
         signals[-1, 0] = 1
         if denominator is not None:
             signals = lfilter([1], denominator, signals, axis=1)
-        columns = np.zeros((self.rows, 2 * self.poles + len(self.inputs)))
+        slopes = np.zeros((2 * self.poles + len(self.inputs), self.rows))
+        self.put_past(slopes, output, denominator)
+        initial = self.poles + len(self.inputs)
+        slopes[self.poles:initial] = signals[:-1]
         for i in range(self.poles):
-            columns[i + 1:, i] = signals[0, :self.rows - i - 1]
-            columns[i:, self.poles + len(self.inputs) + i] = signals[-1, :self.rows - i]
-        columns[:, self.poles:self.poles + len(self.inputs)] = signals[1:-1].T
-        return columns
+            slopes[initial + i, i:] = signals[-1, :self.rows - i]
+        return slopes
+
+    def put_past(self, slopes, output, denominator):
+        """Write the derivatives by a, which are the only ones that depend on the output."""
+        past = -output if denominator is None else -lfilter([1], denominator, output)
+        for i in range(self.poles):
+            slopes[i, i + 1:] = past[:self.rows - i - 1]
 
     def least_squares(self):
         return self.instrumental(self.sensor)
@@ -317,41 +389,42 @@ class _Problem:
         """Estimate with another model's output as instrument; least squares with the measured."""
         # a missing sample spoils the rows in which it is a regressor
         used = np.convolve(~self.used, np.ones(self.poles + 1))[:self.rows] == 0
-        instruments, regressors = self.columns(output)[used], self.columns(self.sensor)[used]
-        return _solve(instruments.T @ regressors, instruments.T @ self.sensor[used],
-                      np.sum(instruments**2, axis=0))
+        instruments, regressors = self.slopes(output)[:, used], self.slopes(self.sensor)[:, used]
+        return _solve(instruments @ regressors.T, instruments @ self.sensor[used],
+                      np.sum(instruments**2, axis=1))
 
-    def search(self, coefficients, iterations=_ITERATIONS):
+    def search(self, coefficients, iterations=_ITERATIONS, small=_SMALL_GAIN):
         """Refined instrumental variables from given a, b; (theta, cost)."""
         theta = np.zeros(2 * self.poles + len(self.inputs))
         theta[:len(coefficients)] = coefficients
         theta = self.stable(theta)
         # constant and initial values are linear: with the wrong ones the first step would be lost
-        gradient = self.columns(*self.simulate(theta))
-        _, linear = self.evaluate(theta)[:2], slice(len(coefficients), None)
-        error = np.where(self.used, self.sensor - self.simulate(theta)[0], 0.0)
-        own = gradient[self.used][:, linear]
-        theta[linear] = _solve(own.T @ own, own.T @ error[self.used], np.sum(own**2, axis=0))
+        cost, error, output, denominator = self.evaluate(theta)
+        own = self.slopes(output, denominator)[len(coefficients):, self.used]
+        theta[len(coefficients):] = _solve(own @ own.T, own @ error[self.used],
+                                           np.sum(own**2, axis=1))
         cost, error, output, denominator = self.evaluate(theta)
         for _ in range(iterations):
-            gradient = self.columns(output, denominator)
-            filled = np.where(self.used, self.sensor, output)
-            right = gradient.T @ error
-            size = np.sum(gradient**2, axis=0)
-            gradient_used = gradient if self.used.all() else gradient[self.used]
-            for matrix in (gradient.T @ self.columns(filled, denominator),
-                           gradient_used.T @ gradient_used):
-                step = _solve(matrix, right, size)
-                found = self.descend(theta, step, cost)
-                if found is not None:
-                    break
-            else:
+            slopes = self.slopes(output, denominator)
+            right, size = slopes @ error, np.sum(slopes**2, axis=1)
+            found = self.descend(theta, _solve(self.refined(slopes, output, denominator), right,
+                                               size), cost)
+            if found is None:
+                own = slopes[:, self.used]
+                found = self.descend(theta, _solve(own @ own.T, right, size), cost)
+            if found is None:
                 break
             gained = cost - found[1][0]
             theta, (cost, error, output, denominator) = found
-            if gained < _SMALL_GAIN * cost / self.rows:
+            if gained < small * cost / self.rows:
                 break
         return theta, cost
+
+    def refined(self, slopes, output, denominator):
+        """Matrix of the refined instrumental variables: instruments by measured regressors."""
+        regressors = slopes.copy()
+        self.put_past(regressors, np.where(self.used, self.sensor, output), denominator)
+        return slopes @ regressors.T
 
     def descend(self, theta, step, cost):
         """Longest of the step's halvings that lowers the cost, and what it leads to."""
@@ -371,7 +444,7 @@ class _Problem:
 def _result(record, problem, orders, theta, rate, lag_s):
     output, denominator = problem.simulate(theta)
     residual = (problem.sensor - output)[problem.used]
-    gradient = problem.columns(output, denominator)[problem.used]
+    gradient = problem.slopes(output, denominator)[:, problem.used].T
     # initial motion that is over at once determines its coefficients badly, and nothing else
     gradient = gradient[:, np.linalg.norm(gradient, axis=0) > 0]
     covariance = sandwich(gradient, residual, problem.used)
@@ -393,7 +466,7 @@ def _result(record, problem, orders, theta, rate, lag_s):
              "delay_s", "offset")
     values = np.r_[a, b, orders.delay / rate + lag_s, offset]
     return ArxFit(names, values, factors @ covariance @ factors.T, full,
-                  (orders, theta[:count]), orders, rate)
+                  (orders, theta[:count]), orders, rate, lag_s)
 
 
 def _solve(matrix, right, size):
