@@ -39,7 +39,7 @@ setup(
         "numpy>=1.26.4",
         "scipy>=1.11.4",
         "PyYAML",
-        "mcap",
+        "mcap>=1.6.0",  # Writer.flush
         "tqdm",
         "matplotlib",
     ],

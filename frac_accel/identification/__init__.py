@@ -15,14 +15,12 @@ from ..pair import Pair, load_pair
 from ..parameters import parameter_fields, unit_of
 from ..simulation import simulate
 from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
-from .excitation import excited_band, require_excitation
+from .excitation import excited_band, learning_length, require_excitation
 from .output_error import Fit, fit_output_error
 from .structures import FractionalStructure, OscillatorStructure
 
 __all__ = ["STRUCTURES", "Identification", "identify"]
 
-# The share of the record, counted by the reference's energy, that the held-out check learns from.
-_LEARN = 0.6
 # A standard uncertainty above this share of its value: the data do not determine the parameter.
 _UNDETERMINED = 0.2
 # Standard uncertainties by which the damping order must differ from 1 to be called fractional.
@@ -217,8 +215,7 @@ def _noise(residual):
 def _held_out(structure, fit, data):
     """Residual on the last part of the record of a model fitted to the rest alone."""
     pair = data.pair
-    energy = np.cumsum((data.reference - data.reference.mean())**2)
-    split = int(np.searchsorted(energy, _LEARN * energy[-1]))
+    split = learning_length(data.reference)
     rest = slice(split, None)
     if len(pair) - split < 256 or split < 256:
         return float("nan")

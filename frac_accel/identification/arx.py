@@ -8,8 +8,9 @@ from scipy.signal import lfilter
 from ..core import Arx
 from ..errors import IdentificationError
 from .continuous_poles import METHOD, continuous_poles
-from .excitation import persistent_excitation
+from .excitation import learning_length, persistent_excitation, strongest_stretch
 from .frequency_response import bulk_delay
+from .output_error import Fit
 from .uncertainty import sandwich
 
 MOST_POLES = 4
@@ -29,7 +30,6 @@ _SMALL_GAIN = 1e-7
 _SMALL_GAIN_OF_TRIAL = 3e-2
 # The strongest stretch of a long record [samples] is enough to choose orders on.
 _CHOICE_LENGTH = 16384
-_LEARN = 0.6
 # Standard errors by which a larger model must predict held-out data better. What a model lacks is
 # not in its uncertainty, while what it has too much is: the test is mild.
 _BETTER = 1.0
@@ -53,8 +53,8 @@ class Orders:
 
 
 @dataclasses.dataclass(frozen=True)
-class ArxFit:
-    """Result of `fit_arx`; attributes as those of `output_error.Fit`.
+class ArxFit(Fit):
+    """Result of `fit_arx`.
 
     Attributes
     ----------
@@ -70,27 +70,9 @@ class ArxFit:
         Part of the delay that the stamps have, not the samples.
     """
 
-    names: tuple
-    values: np.ndarray
-    covariance: np.ndarray
-    residual: np.ndarray
-    unknowns: tuple
     orders: Orders
     sampling_rate_hz: float
     lag_s: float
-
-    @property
-    def std(self):
-        """Standard uncertainties, shape (p,)."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0))
-
-    @property
-    def rmse(self):
-        """RMS of the residual [output units]."""
-        return float(np.sqrt(np.nanmean(self.residual**2)))
-
-    def __getitem__(self, name):
-        return float(self.values[self.names.index(name)])
 
     def core(self):
         """Core of a sensor model, without the delay."""
@@ -186,7 +168,8 @@ def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=No
     valid = np.ones(len(sensor), bool) if valid is None else valid
     if start is None:
         most = persistent_excitation(reference, sampling_rate_hz)[0]
-        start = _choose(*_strongest(reference, sensor, valid), most)
+        part = strongest_stretch(reference, _CHOICE_LENGTH)
+        start = _choose(reference[part], sensor[part], valid[part], most)
     orders, coefficients = start
     record = _Record(reference, sensor, valid, orders)
     problem = record.problem(orders)
@@ -204,16 +187,6 @@ def least_squares(reference, sensor, orders):
     return problem.least_squares()[:orders.coefficients]
 
 
-def _strongest(reference, sensor, valid):
-    """Stretch of the record in which the reference has most energy."""
-    if len(sensor) <= _CHOICE_LENGTH:
-        return reference, sensor, valid
-    energy = np.r_[0, np.cumsum(np.square(reference - reference.mean()))]
-    first = int(np.argmax(energy[_CHOICE_LENGTH:] - energy[:-_CHOICE_LENGTH]))
-    part = slice(first, first + _CHOICE_LENGTH)
-    return reference[part], sensor[part], valid[part]
-
-
 def _choose(reference, sensor, valid, most):
     """Orders and coefficients to start from.
 
@@ -229,9 +202,8 @@ def _choose(reference, sensor, valid, most):
     reach = min(_LONG_INPUTS, len(sensor) // 20)
     window = Orders(0, 0, bulk - reach), Orders(_LONG_POLES, 2 * reach, bulk - reach)
     record = _Record(reference, sensor, valid, *window)
-    energy = np.cumsum(np.square(record.reference - record.reference.mean()))
-    learn = slice(int(np.clip(np.searchsorted(energy, _LEARN * energy[-1]),
-                              record.rows // 4, record.rows * 3 // 4)))
+    learn = slice(int(np.clip(learning_length(record.reference), record.rows // 4,
+                              record.rows * 3 // 4)))
     long = record.problem(window[1], learn)
     long_output = long.simulate(long.stable(long.least_squares()))[0]
 

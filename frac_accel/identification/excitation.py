@@ -9,6 +9,8 @@ from ..errors import IdentificationError
 _FLOOR = 1e-4
 # Bins over which the window (its side lobes are 92 dB down) spreads a pure line.
 _LINE_BINS = 8
+# Share of the reference's energy that a held-out check learns from.
+_LEARN = 0.6
 # Share of the sensor's power that must come from the reference.
 _COHERENT = 0.8
 
@@ -78,6 +80,25 @@ def require_excitation(reference, sampling_rate_hz, parameters):
         f"the reference excites only {where}: persistently exciting of order {order}, but "
         f"{parameters} parameters are to be identified; excite at least {needed} frequencies, "
         f"spread below and across the sensor's resonance, or use noise, a sweep or a shock")
+
+
+def strongest_stretch(reference, length):
+    """Slice of `length` samples in which the reference has most energy; all of a shorter record."""
+    if len(reference) <= length:
+        return slice(0, len(reference))
+    energy = np.r_[0, _energy(reference)]
+    first = int(np.argmax(energy[length:] - energy[:-length]))
+    return slice(first, first + length)
+
+
+def learning_length(reference):
+    """Number of samples to learn from, by the reference's energy; the rest is held out."""
+    energy = _energy(reference)
+    return int(np.searchsorted(energy, _LEARN * energy[-1]))
+
+
+def _energy(reference):
+    return np.cumsum(np.square(reference - reference.mean()))
 
 
 def _spectrum(reference, sampling_rate_hz):

@@ -7,6 +7,7 @@ from scipy.fft import rfft
 
 from ..errors import IdentificationError
 from ..simulation import Convolution
+from .excitation import strongest_stretch
 from .frequency_response import averaged_response, bulk_delay
 from .uncertainty import sandwich
 
@@ -19,7 +20,7 @@ _IMPROVEMENTS = 25
 _SEARCHES = 2
 # Error of a start on the averaged response, over the best one's, with which it leads nowhere.
 _HOPELESS = 1.5
-_START_LENGTH = 8192
+_START_LENGTH = 16384
 _TRIAL_ITERATIONS = 4
 # Share of the output's power, times the number of independent frequencies, that the best of all
 # resonances and delays still explains of an unrelated signal.
@@ -100,11 +101,9 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
     IdentificationError
         If the best model explains no more than chance would.
     """
-    if start is None and len(sensor) > 2 * _START_LENGTH:
+    if start is None and len(sensor) > _START_LENGTH:
         # where the motion is strongest is enough to find out roughly where the parameters are
-        energy = np.cumsum(np.square(reference - reference.mean()))[::_START_LENGTH]
-        first = int(np.argmax(np.diff(energy))) * _START_LENGTH
-        part = slice(first, first + 2 * _START_LENGTH)
+        part = strongest_stretch(reference, _START_LENGTH)
         start = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
                          None if valid is None else valid[part], lag_s).solve(None).unknowns
     return _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s).solve(start)
