@@ -2,6 +2,7 @@
 
 from .correction.design import design_simulator
 from .correction.stream import Stream
+from .effects import Circumstances
 
 
 class LiveSimulator(Stream):
@@ -28,4 +29,4 @@ class LiveSimulator(Stream):
         return design_simulator(model, sample_rate_hz, **wishes)
 
     def _after(self, values):
-        return self._model.apply_sample_effects(values)
+        return self._model.apply_sample_effects(values, Circumstances.at_rest(len(values)))

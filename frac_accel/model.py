@@ -10,7 +10,8 @@ import numpy as np
 import yaml
 
 from .core import CORES
-from .effects import known_effects
+from .core.static_force import StaticForce
+from .effects import Effect, known_effects
 from .errors import ModelError
 from .parameters import as_mapping, build, number, plain
 
@@ -44,14 +45,27 @@ class AxisModel:
         return core
 
     @property
+    def static_force(self):
+        """StaticForce of the core's spring beyond its linear part; false where there is none."""
+        force = StaticForce()
+        for effect in self.effects:
+            force = effect.add_force(force)
+        return force
+
+    @property
     def delay_s(self):
         """Sum of the pure delays [s]: the value stamped t belongs to t - delay_s."""
         return sum(effect.pure_delay_s() for effect in self.effects)
 
     @property
+    def clock_ratio(self):
+        """Time that passes while the stamps advance by one second."""
+        return float(np.prod([effect.clock_ratio() for effect in self.effects]))
+
+    @property
     def dynamics(self):
         """The core and the linear links around it, without pure delays."""
-        return (self.effective_core, *self.effects)
+        return (self.effective_core, *(effect for effect in self.effects if _is_link(effect)))
 
     def transfer_function(self, s):
         """Composite linear response without its pure delay, at complex `s` [rad/s]."""
@@ -140,16 +154,26 @@ class SensorModel:
         model = self.axis(axis)
         return model.transfer_function(s) * np.exp(-s * model.delay_s)
 
-    def apply_sample_effects(self, values):
-        """Effects that act on the samples after the linear response; shape (n, 3) in and out."""
+    def apply_sample_effects(self, values, circumstances):
+        """Effects that act on the samples after the core and its links.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n, 3)
+        circumstances : Circumstances
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+        """
         for effect, by_axis in self._stages:
-            values = effect.simulate(values, by_axis)
+            values = effect.simulate_axes(values, by_axis, circumstances)
         return values
 
-    def remove_sample_effects(self, values):
+    def remove_sample_effects(self, values, circumstances):
         """Inverse of `apply_sample_effects`."""
         for effect, by_axis in reversed(self._stages):
-            values = effect.invert(values, by_axis)
+            values = effect.invert_axes(values, by_axis, circumstances)
         return values
 
     @classmethod
@@ -295,8 +319,13 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
+def _is_link(effect):
+    """Whether an effect is a linear link (the base class's response is one throughout)."""
+    return type(effect).transfer_function is not Effect.transfer_function
+
+
 def _in_signal_order(effects):
-    effects = tuple(sorted(effects, key=lambda effect: effect.stage))
+    effects = tuple(sorted(effects, key=lambda effect: (effect.stage, effect.cause)))
     causes = [effect.cause for effect in effects]
     for cause in causes:
         if causes.count(cause) > 1:

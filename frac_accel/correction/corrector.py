@@ -1,5 +1,6 @@
 """Correction of raw samples, for node and command alike."""
 
+from ..effects import Circumstances
 from .design import design_inverse
 from .stream import Stream
 
@@ -33,4 +34,4 @@ class Corrector(Stream):
         return design_inverse(model, sample_rate_hz, **wishes)
 
     def _before(self, values):
-        return self._model.remove_sample_effects(values)
+        return self._model.remove_sample_effects(values, Circumstances.at_rest(len(values)))

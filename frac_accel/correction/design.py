@@ -6,6 +6,7 @@ import functools
 import numpy as np
 
 from ..core import Arx
+from ..effects import Circumstances
 from ..errors import DesignError, FracAccelError
 from ..model import AXES
 from .fitting import LOWEST_SHARE, FilterProblem, evaluate
@@ -113,7 +114,8 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
                         ("lowest_hz", lowest_hz), ("tolerance", tolerance)):
         if value is not None:
             _positive(value, name)
-    model.remove_sample_effects(np.zeros((1, 3)))  # refuses those that cannot be undone
+    model.remove_sample_effects(np.zeros((1, 3)), Circumstances.at_rest(1))  # refuses singular ones
+    _require_live(model)
     known = model.band_hz[1] if model.band_hz else np.inf
     bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz, known)
              for name, axis in zip(AXES, model.axes)]
@@ -155,6 +157,7 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
         If the tolerance cannot be met.
     """
     rate = _positive(sampling_rate_hz, "sampling_rate_hz")
+    _require_live(model)
     # a sensor whose stamps are early (a negative delay) can only be played so much later
     wait = int(np.ceil(max(0.0, *(-axis.delay_s * rate for axis in model.axes))))
 
@@ -169,6 +172,15 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
     return FilterDesign(model=model, sampling_rate_hz=rate,
                         axes=tuple(p.solve(delay, tolerance) for p in problems),
                         delay_samples=delay + wait, sensor_delay_ns=0)
+
+
+def _require_live(model):
+    """Raise DesignError where an effect is not yet done live."""
+    for axis in model.axes:
+        for effect in axis.effects:
+            if axis.static_force or effect.cause in (
+                    "clock_skew", "gain_drift", "tone_interference", "temperature_sensitivity"):
+                raise DesignError(f"effects: {effect.cause} cannot be done live yet")
 
 
 def _choose_delay(problems, rate, max_delay_s, tolerance):

@@ -1,19 +1,46 @@
 """What every effect can do: be simulated and be inverted.
 
-An effect acts in one of three ways, and overrides what it needs:
+An effect acts in one of these ways, and overrides what it needs:
 
 * on the core's parameters (`change_core`), e.g. fractional damping;
+* on the core's spring (`add_force`), e.g. cubic stiffness;
 * as a linear time-invariant link (`transfer_function`, `pure_delay_s`), e.g. a low-pass: all
   links of an axis and its core form one composite response, simulated and inverted as one filter;
-* on the samples after it (`simulate`, `invert`), e.g. an offset.
+* on the sensor's clock (`clock_ratio`);
+* on the samples after all that (`simulate`, `invert`), e.g. an offset.
 """
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from ..core import Oscillator
+from ..errors import ModelError
+
 # Place in the signal's way through the sensor, from base to record.
-MOUNTING, CORE, CONDITIONER, DELAY, GAIN, CROSS_AXIS, OFFSET = range(7)
+(MOUNTING, CORE, CONDITIONER, DELAY, GAIN, CROSS_AXIS, OFFSET, DEAD_ZONE, INTERFERENCE, CLIPPING,
+ QUANTIZATION, STAMPS) = range(12)
+
+
+class Circumstances(NamedTuple):
+    """When and how warm the samples were.
+
+    Attributes
+    ----------
+    time_s : ndarray, shape (n,)
+        Time [s] since the record's start.
+    temperature_c : ndarray, shape (n,), or None
+        Temperature [°C]; None where it is not known.
+    """
+
+    time_s: np.ndarray
+    temperature_c: np.ndarray
+
+
+    @classmethod
+    def at_rest(cls, n):
+        """`n` samples at the record's start and at 25 °C."""
+        return cls(np.zeros(n), np.full(n, 25.0))
 
 
 class Effect:
@@ -27,9 +54,17 @@ class Effect:
         """Time [s] by which this effect moves the signal as it is."""
         return 0.0
 
+    def clock_ratio(self):
+        """Time that passes while the stamps advance by one second."""
+        return 1.0
+
     def change_core(self, core):
         """Core as this effect leaves it."""
         return core
+
+    def add_force(self, force):
+        """`StaticForce` of the core's spring as this effect leaves it."""
+        return force
 
     def transfer_function(self, s):
         """Linear link's transfer function at complex `s` [rad/s], without its pure delay."""
@@ -47,9 +82,28 @@ class Effect:
         """Zeros of the link [rad/s]."""
         return np.array([])
 
+    def simulate(self, values, circumstances):
+        """Samples of one axis after this effect.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n,)
+            Samples before it.
+        circumstances : Circumstances
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+        return values
+
+    def invert(self, values, circumstances):
+        """Samples before this effect, from those after it; the inverse of `simulate`."""
+        return values
+
     @classmethod
-    def simulate(cls, values, by_axis):
-        """Samples after this effect.
+    def simulate_axes(cls, values, by_axis, circumstances):
+        """Samples of all axes after this cause.
 
         Parameters
         ----------
@@ -57,14 +111,29 @@ class Effect:
             Samples before it.
         by_axis : dict of int to Effect
             The effect of this cause on each axis that has it.
+        circumstances : Circumstances
 
         Returns
         -------
         ndarray, shape (n, 3)
         """
-        return values
+        result = values.copy()
+        for axis, effect in by_axis.items():
+            result[:, axis] = effect.simulate(values[:, axis], circumstances)
+        return result
 
     @classmethod
-    def invert(cls, values, by_axis):
-        """Samples before this effect, from those after it; the inverse of `simulate`."""
-        return values
+    def invert_axes(cls, values, by_axis, circumstances):
+        """Samples of all axes before this cause; the inverse of `simulate_axes`."""
+        result = values.copy()
+        for axis, effect in by_axis.items():
+            result[:, axis] = effect.invert(values[:, axis], circumstances)
+        return result
+
+
+def require_oscillator(core, cause):
+    """The core; raise ModelError where it is not an oscillator."""
+    if not isinstance(core, Oscillator):
+        raise ModelError(f"effects: {cause} given with a core of type {core.type}, expected an "
+                         "oscillator")
+    return core

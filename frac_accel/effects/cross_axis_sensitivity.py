@@ -32,11 +32,11 @@ class CrossAxisSensitivity(Effect):
         return matrix
 
     @classmethod
-    def simulate(cls, values, by_axis):
+    def simulate_axes(cls, values, by_axis, circumstances):
         return _mix(values, cls.matrix(by_axis))
 
     @classmethod
-    def invert(cls, values, by_axis):
+    def invert_axes(cls, values, by_axis, circumstances):
         return _mix(values, _inverse(tuple(by_axis.items())))
 
 

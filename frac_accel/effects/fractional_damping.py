@@ -2,10 +2,8 @@
 
 import dataclasses
 
-from ..core import Oscillator
-from ..errors import ModelError
 from ..parameters import parameter
-from .base import CORE, Effect
+from .base import CORE, Effect, require_oscillator
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,8 +19,6 @@ class FractionalDamping(Effect):
 
     def change_core(self, core):
         """Raise ModelError where the core is not an oscillator."""
-        if not isinstance(core, Oscillator):
-            raise ModelError(f"effects: fractional_damping given with a core of type {core.type}, "
-                             "expected an oscillator")
-        return dataclasses.replace(core, damping_order=self.damping_order,
+        return dataclasses.replace(require_oscillator(core, self.cause),
+                                   damping_order=self.damping_order,
                                    damping_ratio=self.damping_ratio)

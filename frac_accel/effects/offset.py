@@ -16,16 +16,8 @@ class Offset(Effect):
 
     offset: float = parameter("output units")
 
-    @classmethod
-    def simulate(cls, values, by_axis):
-        result = values.copy()
-        for axis, effect in by_axis.items():
-            result[:, axis] += effect.offset
-        return result
+    def simulate(self, values, circumstances):
+        return values + self.offset
 
-    @classmethod
-    def invert(cls, values, by_axis):
-        result = values.copy()
-        for axis, effect in by_axis.items():
-            result[:, axis] -= effect.offset
-        return result
+    def invert(self, values, circumstances):
+        return values - self.offset

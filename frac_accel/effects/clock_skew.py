@@ -1,0 +1,21 @@
+"""Clock that runs at another rate than the reference's."""
+
+import dataclasses
+
+from ..parameters import parameter
+from .base import DELAY, Effect
+
+
+@dataclasses.dataclass(frozen=True)
+class ClockSkew(Effect):
+    """The value stamped t belongs to t (1 + 1e-6 skew), t from the record's start."""
+
+    cause = "clock_skew"
+    stage = DELAY
+    explanation = "The sensor's clock runs at another rate than the reference's."
+
+    # no crystal is off by more than this
+    skew_ppm: float = parameter("1e-6", minimum=-10_000, maximum=10_000)
+
+    def clock_ratio(self):
+        return 1 + 1e-6 * self.skew_ppm

@@ -1,0 +1,24 @@
+"""Natural frequency and damping other than the model's."""
+
+import dataclasses
+
+from ..parameters import parameter
+from .base import CORE, Effect, require_oscillator
+
+
+@dataclasses.dataclass(frozen=True)
+class CoreParameterShift(Effect):
+    """The oscillator has another natural frequency and damping ratio, as ageing leaves it."""
+
+    cause = "core_parameter_shift"
+    stage = CORE
+    explanation = "The sensor's natural frequency and damping are no longer those of the model."
+
+    natural_frequency_hz: float = parameter("Hz", above=0, maximum=1e8)
+    damping_ratio: float = parameter("1", above=0, maximum=100)
+
+    def change_core(self, core):
+        """Raise ModelError where the core is not an oscillator."""
+        return dataclasses.replace(require_oscillator(core, self.cause),
+                                   natural_frequency_hz=self.natural_frequency_hz,
+                                   damping_ratio=self.damping_ratio)

@@ -1,0 +1,23 @@
+"""Spring that hardens or softens with displacement, the same both ways."""
+
+import dataclasses
+
+from ..parameters import parameter
+from .base import CORE, Effect, require_oscillator
+
+
+@dataclasses.dataclass(frozen=True)
+class CubicStiffness(Effect):
+    r"""Restoring force :math:`\omega_0^2 (q + \alpha_3 q^3)`, the spring of G. Duffing (1918)."""
+
+    cause = "cubic_stiffness"
+    stage = CORE
+    explanation = "The spring hardens (or softens) at large displacement, the same both ways."
+
+    alpha3: float = parameter("1/(output units)^2")
+
+    def change_core(self, core):
+        return require_oscillator(core, self.cause)
+
+    def add_force(self, force):
+        return force.with_power(3, self.alpha3)

@@ -1,0 +1,23 @@
+"""Spring that is harder one way than the other."""
+
+import dataclasses
+
+from ..parameters import parameter
+from .base import CORE, Effect, require_oscillator
+
+
+@dataclasses.dataclass(frozen=True)
+class QuadraticStiffness(Effect):
+    r"""Restoring force :math:`\omega_0^2 (q + \alpha_2 q^2)`."""
+
+    cause = "quadratic_stiffness"
+    stage = CORE
+    explanation = "The spring is harder in one direction than in the other."
+
+    alpha2: float = parameter("1/(output units)")
+
+    def change_core(self, core):
+        return require_oscillator(core, self.cause)
+
+    def add_force(self, force):
+        return force.with_power(2, self.alpha2)

@@ -1,0 +1,17 @@
+"""Stamps that scatter."""
+
+import dataclasses
+
+from ..parameters import parameter
+from .base import STAMPS, Effect
+
+
+@dataclasses.dataclass(frozen=True)
+class TimestampJitter(Effect):
+    """Stamps scatter around the instants of the samples, whose values are as they are."""
+
+    cause = "timestamp_jitter"
+    stage = STAMPS
+    explanation = "The stamps scatter around the instants at which the samples were taken."
+
+    rms_s: float = parameter("s", minimum=0, maximum=10)
