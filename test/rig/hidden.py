@@ -22,6 +22,7 @@ FEWEST_TIMES_NOISE = 3.0
 MOST_TIMES_NOISE = 100.0
 EXCITATIONS = ("band_noise", "multisine", "noise_bursts")
 TEMPERATURE_RATE_HZ = 20.0
+ON_STAMPS = {"timestamp_jitter", "dropped_samples"}
 
 # The second one of these says what the first one says: the truth would not be unique.
 INSEPARABLE = ({"core_parameter_shift", "fractional_damping"},)
@@ -144,7 +145,8 @@ def _draw(rng, seed, causes, kind, excitation_name, times_noise):
     temperature_c = _draw_temperature(rng, excitation.samples)
 
     def output(effects):
-        """Noise-free values of axis x."""
+        """Noise-free values of axis x, with every sample in its place."""
+        effects = {cause: effects[cause] for cause in effects if cause not in ON_STAMPS}
         moved = excitation if "cross_axis_sensitivity" in effects else along_x
         try:
             record = simulate_record(Sensor(core, effects), moved, temperature_c=temperature_c)
