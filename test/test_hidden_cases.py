@@ -5,7 +5,8 @@ import pytest
 import rig
 from rig.hidden import EXCITATIONS, KINDS, draw_case, draw_causes
 
-from frac_accel import simulate
+from frac_accel import read_bag, simulate
+from frac_accel.bag import read_temperature
 
 RATE = 2000.0
 STAMPS = {"timestamp_jitter", "dropped_samples"}
@@ -66,6 +67,19 @@ def test_a_case_is_drawn_again_bit_by_bit():
     assert np.array_equal(one.record.sensor, other.record.sensor)
     assert not np.array_equal(one.record.sensor[:100],
                               draw_case(7, {"clipping", "offset"}).record.sensor[:100])
+
+
+def test_the_bag_holds_what_the_samples_are(tmp_path):
+    case = draw_case(9, {"temperature_sensitivity", "dropped_samples"})
+    case.write(tmp_path / "case.mcap")
+    read = read_bag(tmp_path / "case.mcap")
+    reference, sensor, (stamps_ns, celsius) = case.samples()
+    for samples, topic in ((reference, "/imu/reference"), (sensor, "/imu/data_raw")):
+        assert np.array_equal(read[topic].stamps_ns, samples.stamps_ns)
+        assert np.array_equal(read[topic].values, samples.values)
+    temperature = read_temperature(tmp_path / "case.mcap")
+    assert np.array_equal(temperature.stamps_ns, stamps_ns)
+    assert np.array_equal(temperature.celsius, celsius)
 
 
 @pytest.mark.parametrize("cause, times_noise", [("sensitivity_error", 0.1),

@@ -90,6 +90,18 @@ class HiddenCase:
         return (Samples.of(record.stamps_ns, record.reference),
                 Samples.of(record.sensor_stamps_ns, record.sensor), temperature)
 
+    def write(self, path):
+        """The same as a bag, under the default topics."""
+        from frac_accel import bag
+
+        reference, sensor, temperature = self.samples()
+        topics = {bag.REFERENCE_TOPIC: reference, bag.RAW_TOPIC: sensor}
+        if temperature is not None:
+            stamps_ns, celsius = temperature
+            topics[bag.TEMPERATURE_TOPIC] = bag.Temperatures(
+                stamps_ns, celsius, np.full(len(celsius), np.nan), "accel_link")
+        bag.write_bag(path, topics)
+
     def model(self):
         """The baseline as the `SensorModel` that is in use."""
         from frac_accel.model import SensorModel
