@@ -110,6 +110,22 @@ def test_likelihood_ratio_limit_is_that_of_the_test_itself():
     assert abs(np.mean(statistic > threshold) - 0.9) < 0.025
 
 
+def test_power_of_a_cause_that_is_found_from_its_noise_on():
+    strengths = np.geomspace(0.03, 10, 24)
+    rows = [row("power", ["offset"], ["offset"] if s > 1 else [], strength={"offset": s},
+                truth={"offset": {"offset": s}}) for s in strengths]
+    power = score.power(rows, 0.01)
+    assert 0.7 < power.found_in_90_percent < 2.2
+    assert (power.smallest, power.largest, power.found.successes) == (strengths[0], 10.0, 10)
+    assert power.limit == score.likelihood_ratio_limit(24_000, 1, 0.01)
+    unfound = [r | {"findings": {}} for r in rows]
+    assert np.isnan(score.power(unfound, 0.01).found_in_90_percent)
+    unfound = [r | {"causes": ("dead_zone",), "truth": {"dead_zone": {"half_width": 1.0}},
+                    "strength": {"dead_zone": r["strength"]["offset"]}} for r in unfound]
+    page = markdown(rows + unfound, "this test")
+    assert "| `dead_zone` | above 10 |" in page
+
+
 def test_gains_against_the_oracle():
     rows = [row("single", ["offset"], ["offset"], extended_rmse=1.1, oracle_rmse=1.0,
                 correction={"in_use": 5.0, "extended": 3.0, "oracle": 3.0}),
@@ -161,6 +177,7 @@ def test_a_diagnoser_that_knows_the_truth_a_silent_and_a_broken_one():
     assert score.consistent(clean) and score.unexplained(outside)
     assert score.exact(single) and not score.wrong(single)
     errors = score.parameter_errors([single])
+    assert score.right(clean) and score.right(outside) and score.right(single) is None
     assert errors and all(e.of_value.low == e.covered.low > 0 for e in errors.values())
     silence = run(trials[2], silent)
     assert not score.exact(silence) and not score.wrong(silence)

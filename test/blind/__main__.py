@@ -12,6 +12,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from . import score
 from .plan import GROUPS, plan
 from .report import markdown
 from .trial import run
@@ -45,6 +46,10 @@ def main():
             stream.flush()
             rows[row["name"], row["seed"]] = row
     command = f"python -m blind {' '.join(sys.argv[1:])}".strip()
+    for row in (rows[key(trial)] for trial in trials):
+        if score.right(row) is False:
+            print(f"{row['name']} seed {row['seed']}: {row['error'] or row['verdict']}, named "
+                  f"{', '.join(row['findings']) or 'nothing'}")
     page = markdown([rows[key(trial)] for trial in trials], command)
     arguments.output.write_text(page)
     print(f"{arguments.output}: written from {kept}")

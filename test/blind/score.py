@@ -56,11 +56,7 @@ def exact(row):
 
 
 def wrong(row):
-    """Names of causes that are not there.
-
-    Without a model there is one truth less: what the identified model took in may also come out
-    as nothing, but not as something else.
-    """
+    """Names of causes that are not there."""
     return named(row) - set(row["causes"])
 
 
@@ -72,6 +68,13 @@ def consistent(row):
 def unexplained(row):
     """True where physics outside the catalogue is seen and given no name."""
     return row["verdict"] in ("unexplained", "partly_explained") and not row["findings"]
+
+
+def right(row):
+    """Whether a diagnosis is what it should be for its group; None for the power study."""
+    judges = {"single": exact, "multiple": exact, "clean": consistent, "outside": unexplained,
+              "without_model": lambda row: row["error"] is None and not wrong(row)}
+    return judges[row["group"]](row) if row["group"] in judges else None
 
 
 def confusion(rows):

@@ -72,15 +72,14 @@ def corrections(case, extended):
     from frac_accel.validation import validate
 
     reference, sensor, _ = case.samples()
-    true = SensorModel.from_dict(case.sensor.to_model())
     try:
-        oracle = validate(reference, sensor, true)
+        oracle = validate(reference, sensor, SensorModel.from_dict(case.sensor.to_model()))
         wish = {"bandwidth_hz": oracle.filters["axes"]["x"]["band_hz"][1]}
         judged = {"oracle": oracle, "extended": validate(reference, sensor, extended, **wish),
                   "in_use": validate(reference, sensor, case.model(), **wish)}
         return {name: v.comparison.corrected.total.nrmse for name, v in judged.items()}
-    except FracAccelError as error:
-        return str(error)
+    except Exception as error:  # as in `run`
+        return f"{type(error).__name__}: {error}"
 
 
 def _finite(value):
