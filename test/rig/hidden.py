@@ -176,7 +176,7 @@ def _draw(rng, seed, causes, kind, excitation_name, times_noise):
         if cause == "timestamp_jitter":
             return _rms(np.gradient(without) * RATE_HZ) * effects[cause]["rms_s"]
         if cause == "dropped_samples":
-            return _rms(np.diff(without)) * np.sqrt(effects[cause]["fraction"])
+            return _rms(np.diff(without)) * float(np.sqrt(effects[cause]["fraction"]))
         return _rms(output({**others, cause: effects[cause]}) - without)
 
     def strong_enough(effect):
