@@ -382,4 +382,7 @@ def _integrate(grid, step, on_velocity, rates, weights, physics):
             if 1 - position < SHORTEST_SPLIT:
                 break
         q[index + 2], v[index + 2] = state[0], state[1]
+        if not np.isfinite(state[0]):
+            q[-1] = np.nan
+            break
     return q, v
