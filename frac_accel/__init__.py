@@ -8,6 +8,7 @@ _HOME = {
     "SensorModel": "model",
     "simulate": "simulation",
     "identify": "identification",
+    "diagnose": "diagnosis",
     "design_inverse": "correction.design",
     "Corrector": "correction.corrector",
     "LiveSimulator": "live_simulation",

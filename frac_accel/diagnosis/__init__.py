@@ -13,7 +13,7 @@ from ..pair import Pair
 from . import integrity
 from .engine import Engine
 from .judgement import Diagnosis, Finding, Loose, insufficient, judge
-from .leftover import relation
+from .leftover import related
 from .record import Record
 from .starts import CAUSES
 
@@ -22,9 +22,6 @@ __all__ = ["Diagnosis", "Finding", "diagnose"]
 _FEWEST = 512
 # Parameters of a classical core.
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
-# Share of the sensor's power that must follow the reference, and its score against chance.
-_SHARED = 0.05
-_RELATED = 8.0
 
 
 def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE_TOPIC,
@@ -146,15 +143,15 @@ def _loose(core, stds):
 def _require_relation(engine, axis):
     """Refuse a sensor that does not follow the reference."""
     p = engine.problem
-    share, score = relation(p.measured, engine.search.fit(engine.search.base).simulated, p.used)
-    if score > _RELATED and share > _SHARED:
+    follows, share = related(p.measured, engine.search.fit(engine.search.base).simulated, p.used)
+    if follows:
         return
     hint = ""
     for other in range(3):
         if other != p.axis and np.ptp(p.record.reference[:, other]):
             simulated = p.simulator(other).simulate(p.baseline.axis(other))
-            elsewhere, surely = relation(p.measured, simulated, p.used)
-            if surely > _RELATED and elsewhere > max(_SHARED, 2 * share):
+            elsewhere, more = related(p.measured, simulated, p.used)
+            if elsewhere and more > 2 * share:
                 hint = f"; it follows the reference's {AXES[other]}: the axes are exchanged"
     raise FracAccelError(f"axis {axis}: the sensor does not follow the reference (they share "
                          f"{max(share, 0):.2%} of the power); they do not belong together{hint}")

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from ..pair import clean
+from ..pair import clean, slots_of
 
 # Samples at the extreme value, and their number against the next value's, that are a pile-up.
 _PILE = 5
@@ -68,7 +68,7 @@ def check(sensor, sampling_rate_hz, column):
     duplicates = int(np.sum(steps == 0))
     back = len(sensor.stamps_ns) - len(stamps) - duplicates - int(np.sum(~finite))
     seconds = (stamps - stamps[0]) * 1e-9
-    slot = np.round(seconds * sampling_rate_hz)
+    slot = slots_of(seconds * sampling_rate_hz)
     slope, start = np.polyfit(slot, seconds, 1)
     scatter = seconds - (slope * slot + start)
     jitter = float(np.std(scatter))

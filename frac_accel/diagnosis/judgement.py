@@ -18,7 +18,7 @@ _LEFT = 0.03
 # Share of the held-out error that a cause must take away to matter.
 _RELEVANT = 0.01
 # Margin, in variances of the noise, by which a cause must beat its nearest rival.
-_CLEAR = 30.0
+_CLEAR = 10.0
 # Standard uncertainties from the model's own value by which a parameter has moved.
 _MOVED = 5.0
 # Share of the residual's power that the lattice must account for.

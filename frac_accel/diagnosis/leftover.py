@@ -12,6 +12,13 @@ from .starts import bulk_shift
 _SEGMENTS = 48
 _SHIFTS = 40
 _ALIKE = 4
+# Share of the sensor's power that must follow the reference, and its score against chance.
+_SHARED = 0.05
+_RELATED = 8.0
+# Share of the power, times the number of independent frequencies, that unrelated signals share at
+# the best of all lags; more than the other is always enough.
+_CHANCE = 12.0
+_ALWAYS = 0.5
 # Standard deviations of the statistic under independence by which a residual is no noise.
 _SIGNIFICANT = 6.0
 
@@ -76,17 +83,26 @@ def leftover(residual, simulated, used, across=()):
     return Leftover(rms, linear, level, linear_score, level_score)
 
 
-def relation(measured, simulated, used):
-    """Share of a signal's power that follows the simulated output, and its score against chance.
+def related(measured, simulated, used):
+    """Whether a signal follows the simulated output, and the share of its power that does.
 
-    Both are moved together first, by the lag at which they are most alike.
+    Both are moved together first, by the lag at which they are most alike. A relation shows in the
+    coherence of many stretches of the record, or, for a shock, in the correlation of the whole,
+    which chance alone makes the larger, the fewer independent frequencies both have in common.
     """
-    rng = np.random.default_rng(0)
     values = np.where(used, measured - measured[used].mean(), 0.0)
+    expected = np.where(used, simulated - simulated[used].mean(), 0.0)
     lag = bulk_shift(simulated, measured, used)
     ahead = slice(max(lag, 0), len(values) + min(lag, 0))
     behind = slice(max(-lag, 0), len(values) - max(lag, 0))
-    return _linear(values[ahead], simulated[behind], rng)
+    values, expected = values[ahead], expected[behind]
+    share, score = _linear(values, expected, np.random.default_rng(0))
+    alike = (values @ expected)**2 / max((values @ values) * (expected @ expected), 1e-300)
+    both = np.abs(rfft(values))**2 * np.abs(rfft(expected))**2
+    independent = np.sum(both)**2 / max(np.sum(both**2), 1e-300)
+    follows = (score > _RELATED and share > _SHARED) \
+        or alike > min(max(_CHANCE / independent, _SHARED), _ALWAYS)
+    return bool(follows), max(share, alike)
 
 
 def _linear(residual, simulated, rng):

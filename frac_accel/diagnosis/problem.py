@@ -177,7 +177,7 @@ class Problem:
         """Orthonormal columns, shape (n, m): what the time before the record may have left."""
         try:
             poles = np.atleast_1d(self.axis_model(effects).poles())
-        except FracAccelError:
+        except (FracAccelError, ArithmeticError):
             poles = np.array([])
         columns = []
         core = self.axis_model(effects).effective_core
@@ -301,12 +301,21 @@ class Problem:
             highs = [limits[key] for key in ("below", "maximum") if limits[key] is not None]
             low, high = max(lows, default=-np.inf), min(highs, default=np.inf)
             if logarithmic:
-                low, high = -60.0, np.log(high) if np.isfinite(high) else 60.0
+                least, most = self.reach(field.name, scale)
+                low, high = np.log(least), np.log(min(high, most))
             else:
                 span = 1e-3 if np.isfinite(low) and np.isfinite(high) else 0
                 low, high = low / scale + span, high / scale - span
             result.append(Unknown(effect.cause, field.name, logarithmic, scale, low, high))
         return result
+
+    def reach(self, name, scale):
+        """Smallest and largest value of a positive parameter that a record could show."""
+        if name.endswith("_hz"):
+            return 1e-6 * self.rate, 1e3 * self.rate
+        if name == "damping_ratio":
+            return 1e-4, 100.0
+        return 1e-9 * scale, 1e9 * scale
 
     def scale(self, cause, name, value):
         """Change of a parameter that counts as one."""
