@@ -63,10 +63,11 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
         return insufficient(f"the record has {len(record)} samples, expected at least {_FEWEST}",
                             model, found)
     fixed, used = _limits(found, record, column)
+    seed = None
     if model is None:
         progress("identifying a classical model")
         try:
-            model, loose = _classical(record, axis, used)
+            model, loose, seed = _classical(record, axis, used)
         except IdentificationError as error:
             return insufficient(str(error), model, found)
     else:
@@ -81,8 +82,8 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     engine = Engine(record, column, model, used,
                     {cause: entry.effect for cause, entry in loose.items()},
                     [cause for cause in CAUSES if cause in known_effects()], progress)
-    _require_relation(engine, axis)
-    return judge(engine, engine.run(), found, fixed, loose, source[1])
+    _require_relation(engine, axis, seed)
+    return judge(engine, engine.run(seed), found, fixed, loose, source[1])
 
 
 def _limits(found, record, column):
@@ -98,12 +99,14 @@ def _limits(found, record, column):
 
 
 def _classical(record, axis, used):
-    """Classical core identified from the record, and the causes that stay free because of it."""
+    """Classical core identified from the record, the causes that stay free because of it, and
+    those that it was identified with."""
     from ..identification import identify
     pair = Pair(record.sampling_rate_hz, record.reference, record.sensor, used, record.lag_s,
                 record.start_ns, float("nan"))
-    core = identify(pair, axis, "oscillator").model.core
-    return SensorModel(core), _loose(core, dict.fromkeys(_CORE, np.inf))
+    model = identify(pair, axis, "oscillator").model
+    return (SensorModel(model.core), _loose(model.core, dict.fromkeys(_CORE, np.inf)),
+            {effect.cause: effect for effect in model.effects})
 
 
 def _left_open(model, axis):
@@ -140,10 +143,11 @@ def _loose(core, stds):
     return loose
 
 
-def _require_relation(engine, axis):
+def _require_relation(engine, axis, seed):
     """Refuse a sensor that does not follow the reference."""
     p = engine.problem
-    follows, share = related(p.measured, engine.search.fit(engine.search.base).simulated, p.used)
+    start = p.simulate({**engine.search.base, **(seed or {})})
+    follows, share = related(p.measured, start, p.used)
     if follows:
         return
     hint = ""

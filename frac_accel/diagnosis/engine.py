@@ -4,7 +4,7 @@ import numpy as np
 from scipy.fft import rfft
 from scipy.ndimage import uniform_filter1d
 
-from ..identification.excitation import learning_length
+from ..identification.excitation import learning_length, strongest_stretch
 from ..identification.uncertainty import sandwich
 from .gain import gain
 from .leftover import leftover
@@ -15,6 +15,8 @@ from .search import Search
 _CHANCE = 30.0
 # Causes that compete for the place of each one found.
 _RIVALS = 4
+# Records of more samples are searched in part first.
+_LONG = 40_000
 
 
 def noise_peak(residual, used):
@@ -29,6 +31,7 @@ class Engine:
 
     def __init__(self, record, axis, baseline, used, base=None, candidates=None, log=None):
         self.problem = Problem(record, axis, baseline, used)
+        self._wanted = used
         keywords = {"candidates": candidates} if candidates else {}
         self.search = Search(self.problem, base, log=log, **keywords)
         self.split = learning_length(record.reference[:, axis])
@@ -43,11 +46,28 @@ class Engine:
         return max(_CHANCE * variance * noise_peak(fitted.residual, self.problem.used),
                    self.floor**2 * left)
 
-    def run(self):
-        """The smallest set that describes the record, and what it leaves."""
-        best = self.search.run(self.threshold, lambda fitted: self.left(fitted).share == 0)
-        best = self.compete(best)
-        return best
+    def run(self, seed=None):
+        """The smallest set of causes that describes the record.
+
+        Parameters
+        ----------
+        seed : dict of str to Effect, optional
+            Causes to begin with.
+
+        Returns
+        -------
+        Fitted
+        """
+        p = self.problem
+        if len(p.record) > _LONG:
+            # where the motion is strongest is enough to find most causes
+            part = strongest_stretch(p.record.reference[:, p.axis], _LONG // 2)
+            found = Engine(p.record.part(part), p.axis, p.baseline, self._wanted[part],
+                           self.search.base, self.search.candidates, self.search.log).run(seed)
+            seed = {cause: effect for cause, effect in found.effects.items()
+                    if cause not in self.search.base}
+        best = self.search.run(self.threshold, lambda fitted: self.left(fitted).share == 0, seed)
+        return self.compete(best)
 
     def score(self, fitted, variance):
         """Cost with a penalty for each parameter, in units of the noise's variance."""

@@ -16,7 +16,7 @@ from .gain import gain
 # Share of the baseline's excess power that may be left where causes are named.
 _LEFT = 0.03
 # Share of the held-out error that a cause must take away to matter.
-_RELEVANT = 0.01
+_RELEVANT = 0.005
 # Margin, in variances of the noise, by which a cause must beat its nearest rival.
 _CLEAR = 10.0
 # Standard uncertainties from the model's own value by which a parameter has moved.

@@ -12,6 +12,9 @@ from .starts import bulk_shift
 _SEGMENTS = 48
 _SHIFTS = 40
 _ALIKE = 4
+_BLOCK = 32
+# Least spread of a correlation that chance is allowed.
+_STEADY = 0.02
 # Share of the sensor's power that must follow the reference, and its score against chance.
 _SHARED = 0.05
 _RELATED = 8.0
@@ -79,7 +82,9 @@ def leftover(residual, simulated, used, across=()):
     rms = float(np.sqrt(np.mean(residual[used]**2)))
     linear, linear_score = max((_linear(residual, signal, rng) for signal in
                                 (simulated, *across)), key=lambda pair: pair[1])
-    level, level_score = _level(residual, simulated, used, rng)
+    level, level_score = max(_level(residual, simulated, used, rng),
+                             _quiet(residual, simulated, used, rng), key=lambda pair: pair[0]
+                             * (pair[1] > _SIGNIFICANT))
     return Leftover(rms, linear, level, linear_score, level_score)
 
 
@@ -152,3 +157,24 @@ def _level(residual, simulated, used, rng):
         moved = np.roll(squared, int(rng.integers(len(squared) // 10, 9 * len(squared) // 10)))
         chance.append(grown(columns.T @ moved))
     return max(found - np.mean(chance), 0.0), (found - np.mean(chance)) / max(np.std(chance), 1e-3)
+
+
+def _quiet(residual, simulated, used, rng):
+    """Share of the residual's power that is missing where the sensor is quiet."""
+    steps = np.diff(simulated, append=simulated[-1:])
+    swing = simulated - simulated[used].mean()
+    signal = swing**2 / np.mean(swing**2) + steps**2 / max(np.mean(steps**2), 1e-300)
+    count = len(residual) // _BLOCK
+    whole = [values[:count * _BLOCK].reshape(count, _BLOCK).sum(axis=1)
+             for values in (residual**2, signal, used.astype(float))]
+    power, signal, weight = (values[whole[2] > 0] for values in whole)
+    quiet = np.argsort(signal)[:max(len(signal) // 5, 4)]
+
+    def alike(power):
+        return np.corrcoef(power / weight, signal)[0, 1]
+    found, chance = alike(power), []
+    for _ in range(_SHIFTS):
+        move = int(rng.integers(len(power) // 10, max(9 * len(power) // 10, len(power) // 10 + 1)))
+        chance.append(alike(np.roll(power, move)))
+    missing = 1 - (power[quiet].sum() / weight[quiet].sum()) / (power.sum() / weight.sum())
+    return max(missing, 0.0), (found - np.mean(chance)) / max(np.std(chance), _STEADY)

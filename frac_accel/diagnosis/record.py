@@ -30,6 +30,13 @@ class Record:
     def __len__(self):
         return len(self.valid)
 
+    def part(self, rows):
+        """The record's samples of a slice."""
+        celsius = None if self.temperature_c is None else self.temperature_c[rows]
+        return Record(self.sampling_rate_hz, self.reference[rows], self.sensor[rows],
+                      self.valid[rows], self.lag_s, celsius,
+                      self.start_ns + int(rows.start * 1e9 / self.sampling_rate_hz))
+
     @classmethod
     def of(cls, reference, sensor, axis="x", temperature=None):
         """Record of two runs of samples, and (stamps_ns, celsius) where known."""

@@ -124,7 +124,7 @@ class Search:
             effect = dataclasses.replace(effect, **{start.parameter: float(scaled)})
         return cost, cause, effect
 
-    def run(self, threshold, done):
+    def run(self, threshold, done, seed=None):
         """Grow sets of causes until nothing is gained; the best set of each size.
 
         Parameters
@@ -133,8 +133,12 @@ class Search:
             Cost by which a larger set must be better than a smaller fit.
         done : callable
             True for a fit that leaves nothing but noise.
+        seed : dict of str to Effect, optional
+            Causes to begin with, besides none.
         """
         beam = [self.fit(self.base)]
+        if seed:
+            beam = sorted([*beam, self.fit({**self.base, **seed})], key=lambda fit: fit.cost)
         best = beam[0]
         for _ in range(_MOST):
             wanted = {}
