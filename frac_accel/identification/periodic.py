@@ -133,7 +133,8 @@ def _transient(values, whole):
 def _pooled(variance, periods):
     """Variance averaged over as many neighbours as it needs, and its degrees of freedom."""
     size = min(-(-_FREEDOM // (periods - 1)), len(variance))
-    return uniform_filter1d(variance, size, mode="nearest"), size * (periods - 1)
+    # its running sum rounds to either side of zero
+    return np.abs(uniform_filter1d(variance, size, mode="nearest")), size * (periods - 1)
 
 
 def distortion_level(spectra, excited, silent):
