@@ -49,6 +49,8 @@ class Identification:
         where that part holds no signal.
     notes : list of str
         What a user must know before trusting the model.
+    residual : ndarray, shape (n,)
+        Measured less simulated [output units]; NaN where not judged.
     """
 
     model: SensorModel
@@ -58,6 +60,7 @@ class Identification:
     nrmse: float
     held_out_nrmse: float
     notes: list
+    residual: np.ndarray
 
     def as_dict(self):
         """Plain numbers, lists and the model's content."""
@@ -189,7 +192,7 @@ def _identification(chosen, reason, data, axis, provenance):
            if isinstance(fit, ArxFit) else {}),
     })
     return Identification(model, chosen.name, reason, parameters, chosen.nrmse,
-                          chosen.held_out_nrmse, notes)
+                          chosen.held_out_nrmse, notes, fit.residual)
 
 
 def _unit(name):

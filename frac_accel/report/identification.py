@@ -1,0 +1,165 @@
+"""The page of an identification: what was excited, what was found, and how far to trust it."""
+
+import numpy as np
+from scipy.signal import coherence, welch
+
+from ..identification.excitation import strongest_stretch
+from ..identification.frequency_response import averaged_response, bulk_delay
+from ..model import AXES
+from . import figures
+from .page import Page
+from .quantity import rounded
+
+# Length of the close-up [samples], and of records that are shown whole as well.
+_CLOSE_UP = 500
+# Frequencies of the drawn response.
+_FREQUENCIES = 400
+# Two parameters that depend on each other more than this are named.
+_STRONG_CORRELATION = 0.9
+
+
+def identification_page(result, pair, axis="x", provenance=None):
+    """Page of an identified model.
+
+    Parameters
+    ----------
+    result : Identification
+    pair : Pair
+        What the model was identified from.
+    axis : {"x", "y", "z"}
+    provenance : dict, optional
+        As for `Page`.
+
+    Returns
+    -------
+    Page
+    """
+    column = AXES.index(axis)
+    reference, sensor = pair.reference[:, column], pair.sensor[:, column]
+    page = Page(f"Identification: {result.structure}, axis {axis}", provenance)
+    _summary(page.section("Result"), result)
+    _parameters(page.section("Parameters"), result)
+    _excitation(page.section("What was excited"), result, reference, sensor, pair)
+    _response(page.section("Frequency response"), result, reference, sensor, pair, axis)
+    _residual(page.section("Residual"), result, reference, sensor, pair)
+    return page
+
+
+def _summary(section, result):
+    section.notice(f"{result.structure}: {result.reason}.")
+    section.text(f"The model leaves {result.nrmse:.3%} of the sensor's output unexplained (RMS of "
+                 "the residual over the standard deviation of the output). "
+                 + _held_out(result.held_out_nrmse))
+    if result.notes:
+        section.text("Before you trust the model:").items(result.notes)
+
+
+def _held_out(nrmse):
+    if not np.isfinite(nrmse):
+        return "No part of the record could be held out to judge it on unseen data."
+    return (f"A model fitted to the first part of the record alone leaves {nrmse:.3%} on the rest, "
+            "which it has not seen.")
+
+
+def _parameters(section, result):
+    rows = []
+    for name, entry in result.parameters.items():
+        value, std = entry["value"], entry["std"]
+        shown, uncertainty = rounded(value, std)
+        half = figures.COVERAGE_95 * std
+        known = bool(uncertainty)
+        rows.append([
+            name, shown, uncertainty or "–",
+            f"{100 * std / abs(value):.2g} %" if known and value else "–",
+            f"{rounded(value - half, std)[0]} to {rounded(value + half, std)[0]}" if known else "–",
+            entry["unit"]])
+    section.table(["parameter", "value", "standard uncertainty", "relative",
+                   "95 % interval", "unit"], rows,
+                  "Estimates. The uncertainties allow for a residual that is not white; they do "
+                  "not hold what the structure of the model leaves out.")
+    content = result.model.metadata["covariance"]
+    names, covariance = content["parameters"], np.array(content["matrix"])
+    std = np.sqrt(np.diag(covariance))
+    names, kept = [name for name, known in zip(names, std > 0) if known], std > 0
+    matrix = covariance[np.ix_(kept, kept)] / np.outer(std[kept], std[kept])
+    rows = [[name, *(f"{value:.3f}" if j <= i else "" for j, value in enumerate(line))]
+            for i, (name, line) in enumerate(zip(names, matrix))]
+    section.table(["", *names], rows, "Correlation of the estimates.")
+    strong = [f"{names[i]} and {names[j]} ({matrix[i, j]:.3f})"
+              for i in range(len(names)) for j in range(i) if
+              abs(matrix[i, j]) > _STRONG_CORRELATION]
+    if strong:
+        section.text("Known together better than each alone: " + "; ".join(strong) + ".")
+
+
+def _excitation(section, result, reference, sensor, pair):
+    low, high = result.model.band_hz
+    rate = pair.sampling_rate_hz
+    moving = reference - reference.mean()
+    rms, peak = np.std(moving), np.max(np.abs(moving))
+    section.text(f"{len(pair)} samples at {rate:.6g} Hz ({len(pair) / rate:.4g} s), of which "
+                 f"{int(pair.valid.sum())} in both topics. The reference has power, and the sensor "
+                 f"answers to it, from {low:.4g} Hz to {high:.4g} Hz: there the model holds. "
+                 f"Acceleration without its mean: {rms:.4g} m/s² RMS, {peak:.4g} m/s² peak.")
+    size = min(len(pair), max(256, len(pair) // 8))
+    frequency, power = welch(reference, rate, "hann", size)
+    section.figure(
+        figures.spectra(frequency, {"reference": np.sqrt(power)}, "m/s²"),
+        "Amplitude spectral density of the reference.")
+    frequency, shared = coherence(reference, sensor, rate, "hann", size)
+    above = frequency > 0
+    section.figure(
+        figures.lines(frequency[above], {"coherence": shared[above]}, "frequency [Hz]",
+                      "coherence", log="x"),
+        "Coherence of reference and sensor: the share of the sensor's power that a linear sensor "
+        "would owe to the reference.")
+
+
+def _response(section, result, reference, sensor, pair, axis):
+    rate = pair.sampling_rate_hz
+    low, high = result.model.band_hz
+    delay = bulk_delay(reference, sensor)
+    at, response, _ = averaged_response(reference, sensor, rate, delay)
+    inside = (at >= low) & (at <= high)
+    at = at[inside]
+    response = response[inside] * np.exp(-2j * np.pi * at * (delay / rate + pair.lag_s))
+    frequency = np.geomspace(max(at[0], high * 1e-3), high, _FREQUENCIES)
+    curve = figures.ResponseCurve(frequency, result.model.frequency_response(frequency, axis))
+    points = figures.MeasuredResponse(at, response, result.model.frequency_response(at, axis))
+    section.figure(figures.bode(curve, points), "Frequency response of the model and measured.")
+    section.figure(figures.response_deviation(curve, points),
+                   "Measured response relative to the model's.")
+
+
+def _residual(section, result, reference, sensor, pair):
+    rate, residual = pair.sampling_rate_hz, result.residual
+    time_s = np.arange(len(pair)) / rate
+    signals = {"measured": np.where(pair.valid, sensor, np.nan),
+               "model": sensor - residual}
+    section.figure(figures.time_signals(time_s, signals, residual),
+                   "Sensor's output, measured and by the model, and the residual"
+                   + _thinned(len(pair)))
+    if len(pair) > 2 * _CLOSE_UP:
+        part = strongest_stretch(reference, _CLOSE_UP)
+        section.figure(
+            figures.time_signals(time_s[part], {name: values[part]
+                                                for name, values in signals.items()},
+                                 residual[part]),
+            f"The {_CLOSE_UP} samples with the strongest motion.")
+    size = min(len(pair), max(256, len(pair) // 8))
+    frequency, output = welch(sensor, rate, "hann", size)
+    judged = np.isfinite(residual)
+    _, left = welch(np.where(judged, residual, 0), rate, "hann", size)
+    noise = result.model.noise_std
+    section.figure(
+        figures.spectra(frequency, {"measured output": np.sqrt(output),
+                                    "residual": np.sqrt(left / judged.mean())},
+                        level=noise * np.sqrt(2 / rate)),
+        f"Amplitude spectral densities. White noise of the sensor: {noise:.3g} output units "
+        "(standard deviation), from the residual above half the Nyquist frequency.")
+
+
+def _thinned(samples):
+    most = figures.MOST_POINTS
+    return (f". Thinned from {samples} samples to the extremes of {most // 2} stretches."
+            if samples > most else ".")
