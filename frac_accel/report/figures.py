@@ -147,11 +147,13 @@ def time_signals(time_s, signals, residual=None, unit="output units"):
     plotly.graph_objects.Figure
     """
     rows = 1 if residual is None else 2
-    labels = [f"output [{unit}]", f"residual [{unit}]"][:rows]
-    figure = _rows(rows, 280 + 160 * (rows - 1), "time [s]", labels,
-                   weights=(0.62, 0.38)[:rows] if rows == 2 else None)
+    labels = [f"output<br>[{unit}]", f"residual<br>[{unit}]"][:rows]
+    figure = _rows(rows, 280 + 200 * (rows - 1), "time [s]", labels,
+                   weights=(0.6, 0.4) if rows == 2 else None)
     for (name, values), colour in zip(signals.items(), (MEASURED, *SERIES)):
-        _line(figure, *envelope(time_s, values), 1, name, colour)
+        # the measured signal shows on both sides of the model that is drawn upon it
+        _line(figure, *envelope(time_s, values), 1, name, colour,
+              width=3 if colour is MEASURED else 1.2)
     if residual is not None:
         _line(figure, *envelope(time_s, residual), 2, "residual", RESIDUAL)
     return figure
@@ -308,15 +310,17 @@ def _rows(rows, height, x_label, y_labels, weights=None, x_type="linear"):
         legend={"orientation": "h", "x": 0, "y": 1, "yanchor": "bottom"}, hovermode="closest")
     figure.update_xaxes(type=x_type, showline=True, ticks="outside", zeroline=False, mirror=True)
     figure.update_yaxes(showline=True, ticks="outside", zeroline=False, mirror=True)
+    if x_type == "log":
+        figure.update_xaxes(dtick="D2")
     figure.update_xaxes(title={"text": x_label}, row=rows, col=1)
     for row, label in enumerate(y_labels, 1):
         figure.update_yaxes(title={"text": label}, row=row, col=1)
     return figure
 
 
-def _line(figure, x, y, row, name, colour, legend=True, dash="solid"):
+def _line(figure, x, y, row, name, colour, legend=True, dash="solid", width=1.4):
     _add(figure, row, x=x, y=y, mode="lines", name=name, showlegend=legend,
-         line={"color": colour, "width": 1.4, "dash": dash})
+         line={"color": colour, "width": width, "dash": dash})
 
 
 def _points(figure, x, y, row, std=None, legend=True):

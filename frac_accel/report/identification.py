@@ -8,7 +8,7 @@ from ..identification.frequency_response import averaged_response, bulk_delay
 from ..model import AXES
 from . import figures
 from .page import Page
-from .quantity import rounded
+from .quantity import percent, rounded
 
 # Length of the close-up [samples], and of records that are shown whole as well.
 _CLOSE_UP = 500
@@ -70,9 +70,9 @@ def _parameters(section, result):
         known = bool(uncertainty)
         rows.append([
             name, shown, uncertainty or "–",
-            f"{100 * std / abs(value):.2g} %" if known and value else "–",
+            percent(std / abs(value)) if known and value else "–",
             f"{rounded(value - half, std)[0]} to {rounded(value + half, std)[0]}" if known else "–",
-            entry["unit"]])
+            entry["unit"].replace("^2", "²")])
     section.table(["parameter", "value", "standard uncertainty", "relative",
                    "95 % interval", "unit"], rows,
                   "Estimates. The uncertainties allow for a residual that is not white; they do "
@@ -82,10 +82,11 @@ def _parameters(section, result):
     std = np.sqrt(np.diag(covariance))
     names, kept = [name for name, known in zip(names, std > 0) if known], std > 0
     matrix = covariance[np.ix_(kept, kept)] / np.outer(std[kept], std[kept])
-    rows = [[name, *(f"{value:.3f}" if j <= i else "" for j, value in enumerate(line))]
-            for i, (name, line) in enumerate(zip(names, matrix))]
+    # adding zero takes the sign off a zero
+    rows = [[name, *(f"{round(value, 2) + 0.0:.2f}" for value in line[:i + 1]),
+             *[""] * (len(names) - i - 1)] for i, (name, line) in enumerate(zip(names, matrix))]
     section.table(["", *names], rows, "Correlation of the estimates.")
-    strong = [f"{names[i]} and {names[j]} ({matrix[i, j]:.3f})"
+    strong = [f"{names[i]} and {names[j]} ({matrix[i, j]:.2f})"
               for i in range(len(names)) for j in range(i) if
               abs(matrix[i, j]) > _STRONG_CORRELATION]
     if strong:

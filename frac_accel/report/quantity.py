@@ -36,3 +36,14 @@ def rounded(value, std):
                 f"{std * scale:.{places}f}e{exponent:+03d}")
     places = max(digits, 0)
     return f"{round(value, digits):.{places}f}", f"{round(std, digits):.{places}f}"
+
+
+def percent(share):
+    """A share in percent, to two digits, without an exponent.
+
+    Examples
+    --------
+    >>> percent(0.000213), percent(1.094)
+    ('0.021 %', '109 %')
+    """
+    return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"
