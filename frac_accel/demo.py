@@ -31,6 +31,8 @@ from .validation import compare
 AXIS = "x"
 BAGS = Path(__file__).resolve().parent.parent / "bags"
 _PATIENCE_S = 90
+# Of the record, in the picture.
+_SHOWN_S = 0.3
 
 
 def main(arguments=None):
@@ -120,7 +122,7 @@ def table(results, live, raw, same):
 
 
 def picture(results, path):
-    """The first second: reference, raw and corrected, and what is left."""
+    """The first moments: reference, raw and corrected, and what is left."""
     import matplotlib
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
@@ -128,7 +130,7 @@ def picture(results, path):
                                 width_ratios=(3, 2), layout="constrained")
     for (axis, result), (signals, errors) in zip(results.items(), rows):
         time_s = (result.stamps_ns - result.stamps_ns[0]) * 1e-9
-        first = time_s <= 1.0
+        first = time_s <= _SHOWN_S
         time_s = time_s[first]
         signals.plot(time_s, result.before[first], color="#d98c5f", lw=1, label="raw / sensitivity")
         signals.plot(time_s, result.reference[first], color="black", lw=2.2, label="reference")
@@ -140,7 +142,7 @@ def picture(results, path):
                         lw=0.8)
         errors.set_ylabel("|error| [m/s²]")
     rows[0][0].legend(loc="upper right", ncols=3, fontsize="small")
-    rows[0][0].set_title("acceleration, first second")
+    rows[0][0].set_title(f"acceleration, first {_SHOWN_S} s")
     rows[0][1].set_title("error before and after correction")
     for row in rows[-1]:
         row.set_xlabel("time [s]")

@@ -211,7 +211,13 @@ def require_plotly():
 def _plotly_js():
     require_plotly()
     from plotly.offline import get_plotlyjs
-    return get_plotlyjs()
+    try:
+        text = get_plotlyjs()
+    except OSError as error:
+        raise FracAccelError(f"the installed plotly has no plotly.min.js ({error.strerror}); "
+                             "install it with pip install plotly") from None
+    # in a text of the library it would end our script
+    return text.replace("</script", "<\\/script")
 
 
 def _cell(value):
