@@ -98,7 +98,7 @@ def bode(curve, points=None, unit="output units per m/s²"):
                 legend=False)
     _line(figure, frequency, amplitude, 1, "model", MODEL)
     _line(figure, frequency, np.degrees(phase), 2, "model", MODEL, legend=False)
-    figure.update_yaxes(type="log", row=1, col=1)
+    figure.update_yaxes(type="log", dtick="D2", row=1, col=1)
     return figure
 
 
@@ -178,7 +178,8 @@ def spectra(frequency_hz, densities, unit="output units", level=None):
     figure = _rows(1, 420, "frequency [Hz]", [f"density [{unit}/√Hz]"], x_type="log")
     above = frequency_hz > 0
     for (name, values), colour in zip(densities.items(), (MEASURED, RESIDUAL, *SERIES)):
-        _line(figure, frequency_hz[above], values[above], 1, name, colour)
+        _line(figure, frequency_hz[above], values[above], 1, name, colour,
+              legend=len(densities) > 1 or level is not None)
     if level is not None:
         _line(figure, frequency_hz[above][[0, -1]], np.full(2, level), 1, "white noise", MODEL,
               dash="dot")
@@ -260,8 +261,9 @@ def lines(x, series, x_label, y_label, band=None, points=None, log=""):
         _band(figure, x, *band, 1)
     if points is not None:
         _points(figure, points[0], points[1], 1, points[2] if len(points) > 2 else None)
+    alone = len(series) == 1 and band is None and points is None
     for (name, values), colour in zip(series.items(), SERIES):
-        _line(figure, *envelope(x, values), 1, name, colour)
+        _line(figure, *envelope(x, values), 1, name, colour, legend=not alone)
     if "y" in log:
         figure.update_yaxes(type="log")
     return figure
@@ -309,7 +311,8 @@ def _rows(rows, height, x_label, y_labels, weights=None, x_type="linear"):
         font={"family": _FONT, "size": 13},
         legend={"orientation": "h", "x": 0, "y": 1, "yanchor": "bottom"}, hovermode="closest")
     figure.update_xaxes(type=x_type, showline=True, ticks="outside", zeroline=False, mirror=True)
-    figure.update_yaxes(showline=True, ticks="outside", zeroline=False, mirror=True)
+    figure.update_yaxes(showline=True, ticks="outside", zeroline=False, mirror=True,
+                        automargin=True, title={"standoff": 8})
     if x_type == "log":
         figure.update_xaxes(dtick="D2")
     figure.update_xaxes(title={"text": x_label}, row=rows, col=1)
