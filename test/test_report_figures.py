@@ -62,7 +62,7 @@ def test_bode_puts_points_on_the_branch_of_the_model():
     figure = figures.bode(curve, points)
     amplitude, phase = [trace for trace in figure.data if trace.name == "measured"]
     np.testing.assert_allclose(numbers(amplitude.y), 1.01)
-    np.testing.assert_allclose(numbers(amplitude.error_y.array), 1.01 * 1.96 * 0.005)
+    np.testing.assert_allclose(numbers(amplitude.error_y.array), 1.01 * 2 * 0.005)
     np.testing.assert_allclose(numbers(phase.y), np.degrees(0.1 - 2 * np.pi * at * 0.02), atol=0.5)
     deviation = figures.response_deviation(curve, points)
     amplitude, phase = [trace for trace in deviation.data if trace.name == "measured"]

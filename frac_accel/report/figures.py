@@ -18,8 +18,8 @@ SERIES = (MODEL, RESIDUAL, "#3d9c63", "#9467bd", MEASURED, "#c2498a")
 # Points of a signal after `envelope`: more than a screen has columns, twice.
 MOST_POINTS = 4000
 _FONT = "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif"
-# Half-width of a 95 % interval in standard uncertainties (normal distribution).
-COVERAGE_95 = 1.96
+# Half-width of a 95 % interval in standard uncertainties, as calibration certificates have it.
+COVERAGE_FACTOR = 2.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,7 +98,7 @@ def bode(curve, points=None, unit="output units per m/s²"):
                 legend=False)
     _line(figure, frequency, amplitude, 1, "model", MODEL)
     _line(figure, frequency, np.degrees(phase), 2, "model", MODEL, legend=False)
-    figure.update_yaxes(type="log", dtick="D2", row=1, col=1)
+    figure.update_yaxes(type="log", row=1, col=1)
     return figure
 
 
@@ -327,7 +327,7 @@ def _line(figure, x, y, row, name, colour, legend=True, dash="solid", width=1.4)
 
 
 def _points(figure, x, y, row, std=None, legend=True):
-    error = None if std is None else {"array": COVERAGE_95 * std, "thickness": 1, "width": 2}
+    error = None if std is None else {"array": COVERAGE_FACTOR * std, "thickness": 1, "width": 2}
     _add(figure, row, x=x, y=y, mode="markers", name="measured", showlegend=legend, error_y=error,
          marker={"color": RESIDUAL, "size": 4})
 

@@ -10,8 +10,8 @@ from . import figures
 from .page import Page
 from .quantity import percent, rounded
 
-# Length of the close-up [samples], and of records that are shown whole as well.
-_CLOSE_UP = 500
+# Periods of the reference's mean frequency in a close-up.
+_PERIODS = 25
 # Frequencies of the drawn response.
 _FREQUENCIES = 400
 # Two parameters that depend on each other more than this are named.
@@ -66,7 +66,7 @@ def _parameters(section, result):
     for name, entry in result.parameters.items():
         value, std = entry["value"], entry["std"]
         shown, uncertainty = rounded(value, std)
-        half = figures.COVERAGE_95 * std
+        half = figures.COVERAGE_FACTOR * std
         known = bool(uncertainty)
         rows.append([
             name, shown, uncertainty or "–",
@@ -74,7 +74,7 @@ def _parameters(section, result):
             f"{rounded(value - half, std)[0]} to {rounded(value + half, std)[0]}" if known else "–",
             entry["unit"].replace("^2", "²")])
     section.table(["parameter", "value", "standard uncertainty", "relative",
-                   "95 % interval", "unit"], rows,
+                   "95 % interval (k = 2)", "unit"], rows,
                   "Estimates. The uncertainties allow for a residual that is not white; they do "
                   "not hold what the structure of the model leaves out.")
     content = result.model.metadata["covariance"]
@@ -102,7 +102,7 @@ def _excitation(section, result, reference, sensor, pair):
                  f"{int(pair.valid.sum())} in both topics. The reference has power, and the sensor "
                  f"answers to it, from {low:.4g} Hz to {high:.4g} Hz: there the model holds. "
                  f"Acceleration without its mean: {rms:.4g} m/s² RMS, {peak:.4g} m/s² peak.")
-    size = min(len(pair), max(256, len(pair) // 8))
+    size = _segment(len(pair))
     frequency, power = welch(reference, rate, "hann", size)
     section.figure(
         figures.spectra(frequency, {"reference": np.sqrt(power)}, "m/s²"),
@@ -140,14 +140,15 @@ def _residual(section, result, reference, sensor, pair):
     section.figure(figures.time_signals(time_s, signals, residual),
                    "Sensor's output, measured and by the model, and the residual"
                    + _thinned(len(pair)))
-    if len(pair) > 2 * _CLOSE_UP:
-        part = strongest_stretch(reference, _CLOSE_UP)
+    length = _close_up(reference)
+    if len(pair) > 2 * length:
+        part = strongest_stretch(reference, length)
         section.figure(
             figures.time_signals(time_s[part], {name: values[part]
                                                 for name, values in signals.items()},
                                  residual[part]),
-            f"The {_CLOSE_UP} samples with the strongest motion.")
-    size = min(len(pair), max(256, len(pair) // 8))
+            f"The {length} samples with the strongest motion.")
+    size = _segment(len(pair))
     frequency, output = welch(sensor, rate, "hann", size)
     judged = np.isfinite(residual)
     _, left = welch(np.where(judged, residual, 0), rate, "hann", size)
@@ -158,6 +159,17 @@ def _residual(section, result, reference, sensor, pair):
                         level=noise * np.sqrt(2 / rate)),
         f"Amplitude spectral densities. White noise of the sensor: {noise:.3g} output units "
         "(standard deviation), from the residual above half the Nyquist frequency.")
+
+
+def _close_up(reference):
+    """Number of samples in which single oscillations can be seen."""
+    frequency, power = welch(reference, nperseg=_segment(len(reference)))
+    return int(_PERIODS * power.sum() / (power @ frequency))
+
+
+def _segment(samples):
+    """Length of the segments of a spectrum: enough of them to average."""
+    return min(samples, max(256, min(samples // 16, 8192)))
 
 
 def _thinned(samples):
