@@ -3,6 +3,7 @@
 import html
 import json
 import re
+from types import SimpleNamespace
 
 import browser
 import numpy as np
@@ -60,11 +61,12 @@ def test_every_kind_of_figure_is_drawn(tmp_path):
     model = 1 / (1 + 0.1j * frequency)
     curve = figures.ResponseCurve(frequency, model, (np.full(m, -0.01), np.full(m, 0.01)),
                                   (np.full(m, -0.01), np.full(m, 0.01)))
-    points = figures.MeasuredResponse(frequency[::10], 1.01 * model[::10], model[::10],
-                                      np.full(20, 0.005), np.full(20, 0.01))
+    modelled = model[::10]
+    points = SimpleNamespace(frequency_hz=frequency[::10], response=1.01 * modelled,
+                             std_amplitude=np.full(20, 0.005), std_phase_rad=np.full(20, 0.01))
     page = Page("Every kind of figure")
-    page.section("All").figure(figures.bode(curve, points)).figure(
-        figures.response_deviation(curve, points)).figure(
+    page.section("All").figure(figures.bode(curve, points, modelled)).figure(
+        figures.response_deviation(curve, points, modelled)).figure(
         figures.time_signals(time_s, {"a": signal, "b": -signal}, 0.1 * signal)).figure(
         figures.spectra(frequency, {"a": frequency**-0.5}, level=0.05)).figure(
         figures.correlation(np.arange(50), rng.standard_normal(50) / 10, 0.2)).figure(

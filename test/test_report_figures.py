@@ -1,5 +1,7 @@
 """The figures show what they are given, in a file of bearable size."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -55,16 +57,17 @@ def test_bode_puts_points_on_the_branch_of_the_model():
     model = np.exp(-2j * np.pi * frequency * 0.02)
     at = np.geomspace(1, 100, 20)
     response = 1.01 * np.exp(-2j * np.pi * at * 0.02 + 0.1j)
-    points = figures.MeasuredResponse(at, response, np.exp(-2j * np.pi * at * 0.02),
-                                      np.full(20, 0.005), np.full(20, 0.02))
+    modelled = np.exp(-2j * np.pi * at * 0.02)
+    points = SimpleNamespace(frequency_hz=at, response=response, std_amplitude=np.full(20, 0.005),
+                             std_phase_rad=np.full(20, 0.02))
     curve = figures.ResponseCurve(frequency, model, (np.full(300, -0.02), np.full(300, 0.02)),
                                   (np.full(300, -0.1), np.full(300, 0.1)))
-    figure = figures.bode(curve, points)
+    figure = figures.bode(curve, points, modelled)
     amplitude, phase = [trace for trace in figure.data if trace.name == "measured"]
     np.testing.assert_allclose(numbers(amplitude.y), 1.01)
     np.testing.assert_allclose(numbers(amplitude.error_y.array), 1.01 * 2 * 0.005)
     np.testing.assert_allclose(numbers(phase.y), np.degrees(0.1 - 2 * np.pi * at * 0.02), atol=0.5)
-    deviation = figures.response_deviation(curve, points)
+    deviation = figures.response_deviation(curve, points, modelled)
     amplitude, phase = [trace for trace in deviation.data if trace.name == "measured"]
     np.testing.assert_allclose(numbers(amplitude.y), 1.0)
     np.testing.assert_allclose(numbers(phase.y), np.degrees(0.1))

@@ -46,6 +46,9 @@ def run(arguments):
     low, high = result.model.band_hz
     print(f"{len(pair)} samples at {pair.sampling_rate_hz:.6g} Hz, excited from {low:.4g} to "
           f"{high:.4g} Hz")
+    print(result.excitation["words"])
+    if result.excitation["kind"] == "multisine" and result.points and result.points.distortion:
+        print(result.points.distortion["words"])
     print(f"{result.structure}: {result.reason}")
     for name, entry in result.parameters.items():
         print(f"  {name:21} {entry['value']:12.6g} +- {entry['std']:.2g} {entry['unit']}")

@@ -16,10 +16,12 @@ from ..parameters import parameter_fields, unit_of
 from ..simulation import simulate
 from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
 from .excitation import excited_band, learning_length, require_excitation
+from .measured_response import MeasuredResponse
 from .output_error import Fit, fit_output_error
+from .points import ResponsePoints, response_points
 from .structures import FractionalStructure, OscillatorStructure
 
-__all__ = ["STRUCTURES", "Identification", "identify"]
+__all__ = ["STRUCTURES", "Identification", "ResponsePoints", "identify", "response_points"]
 
 # A standard uncertainty above this share of its value: the data do not determine the parameter.
 _UNDETERMINED = 0.2
@@ -51,6 +53,13 @@ class Identification:
         What a user must know before trusting the model.
     residual : ndarray, shape (n,)
         Measured less simulated [output units]; NaN where not judged.
+    excitation : dict
+        ``kind`` of excitation found in the record, and ``words`` for it.
+    points : ResponsePoints or None
+        Frequency response of the pair without a model; None where the record gives none.
+    frequency_domain : dict or None
+        The same structure fitted to the points, and how far its parameters are from those above
+        (`compare_domains`); None for ARX and without points.
     """
 
     model: SensorModel
@@ -61,12 +70,18 @@ class Identification:
     held_out_nrmse: float
     notes: list
     residual: np.ndarray
+    excitation: dict
+    points: ResponsePoints | None
+    frequency_domain: dict | None
 
     def as_dict(self):
         """Plain numbers, lists and the model's content."""
         return {"model": self.model.to_dict(), "structure": self.structure,
                 "reason": self.reason, "parameters": self.parameters,
-                "nrmse": self.nrmse, "held_out_nrmse": self.held_out_nrmse, "notes": self.notes}
+                "nrmse": self.nrmse, "held_out_nrmse": self.held_out_nrmse, "notes": self.notes,
+                "excitation": self.excitation,
+                "points": None if self.points is None else self.points.as_dict(),
+                "frequency_domain": self.frequency_domain}
 
 
 def identify(pair, axis="x", structure="auto", provenance=None, progress=None):
@@ -100,7 +115,7 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None):
                              f"{', '.join(STRUCTURES)}")
     if isinstance(pair, (str, Path)):
         pair = load_pair(pair, axis=axis)
-    data = _Data.of(pair, AXES.index(axis), progress or (lambda words: None))
+    data = _Data.of(pair, axis, progress or (lambda words: None))
     if structure == "auto":
         chosen, reason = _choose(data)
     else:
@@ -114,14 +129,20 @@ class _Data:
     reference: np.ndarray
     sensor: np.ndarray
     spread: float
+    response: MeasuredResponse
     progress: Callable
 
     @classmethod
-    def of(cls, pair, column, progress):
-        sensor = pair.sensor[:, column]
-        return cls(pair, pair.reference[:, column], sensor, float(np.std(sensor)), progress)
+    def of(cls, pair, axis, progress):
+        column = AXES.index(axis)
+        reference, sensor = pair.reference[:, column], pair.sensor[:, column]
+        progress("measuring the frequency response")
+        return cls(pair, reference, sensor, float(np.std(sensor)), MeasuredResponse.of(pair, axis),
+                   progress)
 
     def fit(self, structure, part=slice(None), start=None):
+        if start is None:
+            start = self.response.start(structure)
         record = (self.reference[part], self.sensor[part], self.pair.sampling_rate_hz,
                   self.pair.valid[part], self.pair.lag_s, start)
         if isinstance(structure, ArxStructure):
@@ -174,7 +195,8 @@ def _identification(chosen, reason, data, axis, provenance):
     low, high = excited_band(data.reference, data.sensor, rate)
     parameters = {name: {"value": float(value), "std": float(std), "unit": _unit(name)}
                   for name, value, std in zip(fit.names, fit.values, fit.std)}
-    notes = _notes(parameters, chosen, data, high)
+    compared, more = data.response.compared(chosen.structure, fit)
+    notes = _notes(parameters, chosen, data, high) + data.response.notes + more
     effects = [TimeDelay(fit["delay_s"])]
     if abs(fit["offset"]) > _SIGNIFICANT * parameters["offset"]["std"]:
         effects.append(Offset(fit["offset"]))
@@ -192,7 +214,8 @@ def _identification(chosen, reason, data, axis, provenance):
            if isinstance(fit, ArxFit) else {}),
     })
     return Identification(model, chosen.name, reason, parameters, chosen.nrmse,
-                          chosen.held_out_nrmse, notes, fit.residual)
+                          chosen.held_out_nrmse, notes, fit.residual, data.response.excitation,
+                          data.response.points, compared)
 
 
 def _unit(name):

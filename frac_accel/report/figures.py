@@ -42,34 +42,15 @@ class ResponseCurve:
     phase_interval_rad: tuple | None = None
 
 
-@dataclasses.dataclass(frozen=True)
-class MeasuredResponse:
-    """Points of a measured frequency response.
-
-    Attributes
-    ----------
-    frequency_hz : ndarray, shape (k,)
-    response : ndarray of complex, shape (k,)
-    modelled : ndarray of complex, shape (k,)
-        The model's response at the same frequencies.
-    std_amplitude, std_phase_rad : ndarray, shape (k,), or None
-        Standard uncertainties; that of the amplitude relative to it.
-    """
-
-    frequency_hz: np.ndarray
-    response: np.ndarray
-    modelled: np.ndarray
-    std_amplitude: np.ndarray | None = None
-    std_phase_rad: np.ndarray | None = None
-
-
-def bode(curve, points=None, unit="output units per m/s²"):
+def bode(curve, points=None, modelled=None, unit="output units per m/s²"):
     """Amplitude and phase over frequency.
 
     Parameters
     ----------
     curve : ResponseCurve
-    points : MeasuredResponse, optional
+    points : ResponsePoints, optional
+    modelled : ndarray of complex, shape (k,)
+        The model's response at the frequencies of the points.
     unit : str
         Of the amplitude.
 
@@ -88,13 +69,12 @@ def bode(curve, points=None, unit="output units per m/s²"):
         _band(figure, frequency, np.degrees(phase + low), np.degrees(phase + high), 2,
               legend=False)
     if points is not None:
-        ratio = points.response / points.modelled
+        ratio = points.response / modelled
         # on the model's branch, so that no point lies a turn away
         own = np.interp(points.frequency_hz, frequency, phase) + np.angle(ratio)
         size = np.abs(points.response)
-        _points(figure, points.frequency_hz, size, 1,
-                None if points.std_amplitude is None else size * points.std_amplitude)
-        _points(figure, points.frequency_hz, np.degrees(own), 2, _degrees(points.std_phase_rad),
+        _points(figure, points.frequency_hz, size, 1, size * points.std_amplitude)
+        _points(figure, points.frequency_hz, np.degrees(own), 2, np.degrees(points.std_phase_rad),
                 legend=False)
     _line(figure, frequency, amplitude, 1, "model", MODEL)
     _line(figure, frequency, np.degrees(phase), 2, "model", MODEL, legend=False)
@@ -102,21 +82,23 @@ def bode(curve, points=None, unit="output units per m/s²"):
     return figure
 
 
-def response_deviation(curve, points):
+def response_deviation(curve, points, modelled):
     """How far the measured points are from the model, with the intervals of both.
 
     Parameters
     ----------
     curve : ResponseCurve
-    points : MeasuredResponse
+    points : ResponsePoints
+    modelled : ndarray of complex, shape (k,)
+        The model's response at the frequencies of the points.
 
     Returns
     -------
     plotly.graph_objects.Figure
     """
     figure = _rows(2, 520, "frequency [Hz]", ["amplitude [%]", "phase [°]"], x_type="log")
-    ratio = points.response / points.modelled
-    std = None if points.std_amplitude is None else 100 * np.abs(ratio) * points.std_amplitude
+    ratio = points.response / modelled
+    spreads = 100 * np.abs(ratio) * points.std_amplitude, np.degrees(points.std_phase_rad)
     if curve.amplitude_interval is not None:
         _band(figure, curve.frequency_hz, *(100 * limit for limit in curve.amplitude_interval), 1)
         _band(figure, curve.frequency_hz, *map(np.degrees, curve.phase_interval_rad), 2,
@@ -124,7 +106,7 @@ def response_deviation(curve, points):
     zero = np.zeros(2)
     ends = curve.frequency_hz[[0, -1]]
     shown = 100 * (np.abs(ratio) - 1), np.degrees(np.angle(ratio))
-    for row, (values, spread) in enumerate(zip(shown, (std, _degrees(points.std_phase_rad))), 1):
+    for row, (values, spread) in enumerate(zip(shown, spreads), 1):
         _points(figure, points.frequency_hz, values, row, spread, legend=row == 1)
         _line(figure, ends, zero, row, "model", MODEL, legend=row == 1)
         _focus(figure, values, row)
@@ -347,7 +329,3 @@ def _focus(figure, values, row):
 
 def _add(figure, row, **trace):
     figure.add_scatter(**trace, row=row, col=1)
-
-
-def _degrees(std_rad):
-    return None if std_rad is None else np.degrees(std_rad)

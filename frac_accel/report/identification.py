@@ -4,7 +4,6 @@ import numpy as np
 from scipy.signal import coherence, welch
 
 from ..identification.excitation import strongest_stretch
-from ..identification.frequency_response import averaged_response, bulk_delay
 from ..model import AXES
 from . import figures
 from .page import Page
@@ -40,7 +39,7 @@ def identification_page(result, pair, axis="x", provenance=None):
     _summary(page.section("Result"), result)
     _parameters(page.section("Parameters"), result)
     _excitation(page.section("What was excited"), result, reference, sensor, pair)
-    _response(page.section("Frequency response"), result, reference, sensor, pair, axis)
+    _response(page.section("Frequency response"), result, axis)
     _residual(page.section("Residual"), result, reference, sensor, pair)
     return page
 
@@ -98,6 +97,7 @@ def _excitation(section, result, reference, sensor, pair):
     rate = pair.sampling_rate_hz
     moving = reference - reference.mean()
     rms, peak = np.std(moving), np.max(np.abs(moving))
+    section.text(_sentence(result.excitation["words"]))
     section.text(f"{len(pair)} samples at {rate:.6g} Hz ({len(pair) / rate:.4g} s), of which "
                  f"{int(pair.valid.sum())} in both topics. The reference has power, and the sensor "
                  f"answers to it, from {low:.4g} Hz to {high:.4g} Hz: there the model holds. "
@@ -116,20 +116,44 @@ def _excitation(section, result, reference, sensor, pair):
         "would owe to the reference.")
 
 
-def _response(section, result, reference, sensor, pair, axis):
-    rate = pair.sampling_rate_hz
-    low, high = result.model.band_hz
-    delay = bulk_delay(reference, sensor)
-    at, response, _ = averaged_response(reference, sensor, rate, delay)
-    inside = (at >= low) & (at <= high)
-    at = at[inside]
-    response = response[inside] * np.exp(-2j * np.pi * at * (delay / rate + pair.lag_s))
-    frequency = np.geomspace(max(at[0], high * 1e-3), high, _FREQUENCIES)
-    curve = figures.ResponseCurve(frequency, result.model.frequency_response(frequency, axis))
-    points = figures.MeasuredResponse(at, response, result.model.frequency_response(at, axis))
-    section.figure(figures.bode(curve, points), "Frequency response of the model and measured.")
-    section.figure(figures.response_deviation(curve, points),
-                   "Measured response relative to the model's.")
+def _response(section, result, axis):
+    model, points = result.model, result.points
+    low, high = model.band_hz
+    lowest = low or (points.frequency_hz[0] if points else high / 1000)
+    frequency = np.geomspace(min(lowest, points.frequency_hz[0]) if points else lowest,
+                             max(high, points.frequency_hz[-1]) if points else high, _FREQUENCIES)
+    curve = _curve(model, frequency, axis)
+    modelled = model.frequency_response(points.frequency_hz, axis) if points else None
+    section.figure(figures.bode(curve, points, modelled),
+                   "Frequency response of the model" + (_measured(points) if points else "."))
+    if not points:
+        return
+    section.figure(figures.response_deviation(curve, points, modelled),
+                   "The measured response relative to the model's. Bars and bands are 95 % "
+                   "intervals (k = 2).")
+    if points.distortion:
+        section.text(_sentence(points.distortion["words"]))
+    if result.frequency_domain:
+        _frequency_domain(section, result)
+
+
+def _measured(points):
+    return f", and measured without a model at {len(points)} frequencies: {points.method}."
+
+
+def _frequency_domain(section, result):
+    compared = result.frequency_domain
+    section.text(_sentence(compared["words"]))
+    rows = []
+    for name, entry in compared["parameters"].items():
+        own = result.parameters[name]
+        difference = entry["value"] - own["value"]
+        combined = np.hypot(entry["std"], own["std"])
+        rows.append([name, *rounded(own["value"], own["std"]),
+                     *rounded(entry["value"], entry["std"]), f"{difference / combined:.2f}"])
+    section.table(["parameter", "time domain", "u", "frequency domain", "u", "difference / u"],
+                  rows, "The same structure fitted to the signals and to the points above; u are "
+                  "standard uncertainties, the last of the difference as if both were independent.")
 
 
 def _residual(section, result, reference, sensor, pair):
@@ -161,6 +185,14 @@ def _residual(section, result, reference, sensor, pair):
         "(standard deviation), from the residual above half the Nyquist frequency.")
 
 
+def _curve(model, frequency_hz, axis):
+    return figures.ResponseCurve(frequency_hz, model.frequency_response(frequency_hz, axis))
+
+
+def _sentence(words):
+    return words[0].upper() + words[1:].rstrip(".") + "."
+
+
 def _close_up(reference):
     """Number of samples in which single oscillations can be seen."""
     frequency, power = welch(reference, nperseg=_segment(len(reference)))
@@ -169,7 +201,7 @@ def _close_up(reference):
 
 def _segment(samples):
     """Length of the segments of a spectrum: enough of them to average."""
-    return min(samples, max(256, min(samples // 16, 8192)))
+    return min(samples, max(256, min(samples // 8, 8192)))
 
 
 def _thinned(samples):
