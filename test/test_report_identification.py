@@ -12,16 +12,17 @@ from frac_accel.report.quantity import percent, rounded
 BAG = Path(__file__).resolve().parents[1] / "bags" / "viscoelastic_bench.mcap"
 
 
-def test_page_tells_what_was_found(tmp_path):
+@pytest.mark.parametrize("structure", ["fractional", "arx"])
+def test_page_tells_what_was_found(tmp_path, structure):
     files = {name: str(tmp_path / name) for name in ("m.yaml", "r.html", "r.json")}
-    assert main(["identify", str(BAG), "--axis", "y", "-o", files["m.yaml"], "--report",
-                 files["r.html"], "--json", files["r.json"]]) == 0
+    assert main(["identify", str(BAG), "--axis", "y", "--structure", structure, "-o",
+                 files["m.yaml"], "--report", files["r.html"], "--json", files["r.json"]]) == 0
     found = json.loads(Path(files["r.json"]).read_text())
     text = Path(files["r.html"]).read_text()
     for name, entry in found["parameters"].items():
         value, std = rounded(entry["value"], entry["std"])
         assert re.search(rf"<td>{name}</td><td[^>]*>{re.escape(value)}</td>"
-                         rf"<td[^>]*>{re.escape(std)}</td>", text)
+                         rf"<td[^>]*>{re.escape(std or '–')}</td>", text)
     assert found["reason"] in text
     for part in (found["model"]["provenance"]["sha256"], BAG.name, "--axis y",
                  f"{found['nrmse']:.3%}", f"{found['held_out_nrmse']:.3%}"):

@@ -166,12 +166,12 @@ def _residual(section, result, reference, sensor, pair):
                    + _thinned(len(pair)))
     length = _close_up(reference)
     if len(pair) > 2 * length:
-        part = strongest_stretch(reference, length)
+        part = strongest_stretch(sensor, length)
         section.figure(
             figures.time_signals(time_s[part], {name: values[part]
                                                 for name, values in signals.items()},
                                  residual[part]),
-            f"The {length} samples with the strongest motion.")
+            f"The {length} samples with the strongest output.")
     size = _segment(len(pair))
     frequency, output = welch(sensor, rate, "hann", size)
     judged = np.isfinite(residual)
