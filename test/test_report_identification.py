@@ -21,7 +21,7 @@ def test_page_tells_what_was_found(tmp_path, structure):
     text = Path(files["r.html"]).read_text()
     for name, entry in found["parameters"].items():
         value, std = rounded(entry["value"], entry["std"])
-        assert re.search(rf"<td>{name}</td><td[^>]*>{re.escape(value)}</td>"
+        assert re.search(rf"<td[^>]*>{name}</td><td[^>]*>{re.escape(value)}</td>"
                          rf"<td[^>]*>{re.escape(std or '–')}</td>", text)
     assert found["reason"] in text
     for part in (found["model"]["provenance"]["sha256"], BAG.name, "--axis y",

@@ -101,7 +101,7 @@ def test_columns_of_numbers_are_flush_right():
     section = Page("Title").section("Part").table(
         ["name", "value"], [["a", "1.5e-4"], ["b", "–"], ["c", -3]])
     text = section.html("part")
-    assert text.count('<td class="number">') == 3 and "<td>a</td>" in text
+    assert text.count('<td class="number">') == 3 and '<td class="short">a</td>' in text
 
 
 def test_missing_plotly_is_said_in_one_line(monkeypatch):

@@ -113,6 +113,27 @@ def response_deviation(curve, points, modelled):
     return figure
 
 
+def response_interval(curve):
+    """Half-widths of the interval of a response: what a calibration certificate states.
+
+    Parameters
+    ----------
+    curve : ResponseCurve
+        With its intervals.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    figure = _rows(2, 420, "frequency [Hz]", ["amplitude [± %]", "phase [± °]"], x_type="log")
+    low, high = curve.amplitude_interval
+    _line(figure, curve.frequency_hz, 50 * (high - low), 1, "amplitude", MODEL, legend=False)
+    low, high = curve.phase_interval_rad
+    _line(figure, curve.frequency_hz, np.degrees(high - low) / 2, 2, "phase", MODEL, legend=False)
+    figure.update_yaxes(rangemode="tozero")
+    return figure
+
+
 def time_signals(time_s, signals, residual=None, unit="output units"):
     """Signals over time, and below them what is left.
 

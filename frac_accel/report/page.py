@@ -12,6 +12,8 @@ from ..errors import FracAccelError
 _TEMPLATE = Path(__file__).with_name("page.html")
 # A page with more sections than this has a table of contents.
 _FEW_SECTIONS = 4
+# Cells of tables with so many characters stay in one line.
+_SHORT = 32
 # Names of what `commands._common.provenance` knows; other keys are shown by their own.
 _LABELS = {"sha256": "SHA-256", "frac_accel_version": "frac_accel"}
 _CODE = ("sha256", "command")
@@ -135,12 +137,12 @@ class Section:
         ----------
         headers : sequence of str
         rows : sequence of sequences of (str or number)
-            Columns whose cells all start like a number, or are empty, are set flush right.
+            Columns whose cells all start like a number, or are empty, are set flush right;
+            short words are not broken.
         caption : str
         """
         cells = [[_cell(value) for value in row] for row in rows]
-        kinds = [' class="number"' if any(column) and all(_like_number(text) for text in column)
-                 else "" for column in zip(*cells)] or [""] * len(headers)
+        kinds = [_kind(column) for column in zip(*cells)] or [""] * len(headers)
 
         def line(tag, texts):
             return "<tr>" + "".join(f"<{tag}{kind}>{html.escape(text)}</{tag}>"
@@ -222,6 +224,13 @@ def _plotly_js():
 
 def _cell(value):
     return value if isinstance(value, str) else f"{value:.6g}"
+
+
+def _kind(column):
+    """Attribute of the cells of a column of a table."""
+    if any(column) and all(_like_number(text) for text in column):
+        return ' class="number"'
+    return ' class="short"' if max(map(len, column)) <= _SHORT else ""
 
 
 def _like_number(text):
