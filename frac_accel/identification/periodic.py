@@ -101,7 +101,9 @@ def periodic_response(reference, sensor, valid, sampling_rate_hz, period):
     lines = np.flatnonzero((power > _EXCITED * power.max()) & (power > _ABOVE_NOISE * noise))
     response = mean_above[lines] / mean_below[lines]
     error = above[:, lines] - response * below[:, lines]
-    variance = _pooled(np.sum(np.abs(error)**2, axis=0) / (periods - 1), periods)
+    variance, freedom = _pooled(np.sum(np.abs(error)**2, axis=0) / (periods - 1), periods)
+    # the spread of a Student distribution (JCGM 101:2008, 6.4.9)
+    variance *= freedom / max(freedom - 1, 1)
     # a circular complex variance has half of it on the amplitude and half on the phase
     std = np.sqrt(variance / (2 * periods)) / np.abs(mean_above[lines])
     silent = np.flatnonzero(power <= np.maximum(_SILENT * power.max(), 4 * noise))
@@ -129,8 +131,10 @@ def _transient(values, whole):
 
 
 def _pooled(variance, periods):
+    """Variance averaged over as many neighbours as it needs, and its degrees of freedom."""
     size = min(-(-_FREEDOM // (periods - 1)), len(variance))
-    return uniform_filter1d(variance, size, mode="nearest")
+    # its running sum rounds to either side of zero
+    return np.abs(uniform_filter1d(variance, size, mode="nearest")), size * (periods - 1)
 
 
 def distortion_level(spectra, excited, silent):
@@ -178,12 +182,11 @@ def _rise(spectra, signal):
     """Whether the mean of these lines is above the noise over periods, and the levels in dB."""
     periods, count = spectra.shape
     mean = np.abs(spectra.mean(axis=0))**2
-    noise = _pooled(np.var(spectra, axis=0, ddof=1) / periods, periods)
+    noise, freedom = _pooled(np.var(spectra, axis=0, ddof=1) / periods, periods)
     ratio = mean / np.maximum(noise, 1e-300)
-    spread = np.sqrt((1 + 1 / _FREEDOM) / count)
-    found = bool(np.mean(ratio) > 1 + _SIGNIFICANT * spread)
+    spread = np.sqrt((1 + 1 / freedom) / count)
     excess = np.mean(mean) - np.mean(noise)
-    found = found and excess > 0
+    found = bool(np.mean(ratio) > 1 + _SIGNIFICANT * spread and excess > 0)
     return (found, _db(excess / signal) if found else float("nan"), _db(np.mean(noise) / signal),
             _db(np.mean(ratio)))
 

@@ -77,11 +77,16 @@ def fit_dwell(reference, sensor, valid, sampling_rate_hz, tone):
         None where the steady part has fewer than three cycles or 32 samples.
     """
     whole = slice(tone.start, tone.stop)
-    quarter = (tone.stop - tone.start) // 4
-    middle = reference[tone.start + quarter:tone.stop - quarter]
-    omega = _frequency(middle, np.arange(len(middle)) - (len(middle) - 1) / 2,
+    used = valid[whole]
+    time = np.arange(len(used))
+    quarter = len(used) // 4
+    middle = used & (time >= quarter) & (time < len(used) - quarter)
+    if middle.sum() < _FEWEST_SAMPLES:
+        return None
+    omega = _frequency(reference[whole][middle], time[middle] - time[middle].mean(),
                        2 * np.pi * tone.frequency_hz / sampling_rate_hz)
-    steady = _steady(reference[whole], omega) & _steady(sensor[whole], omega)
+    steady = np.logical_and(*(_steady(values[whole], used, middle, time, omega)
+                              for values in (reference, sensor)))
     start, stop = _around_middle(steady)
     start, stop = tone.start + start, tone.start + stop
     used = valid[start:stop]
@@ -100,10 +105,14 @@ def fit_dwell(reference, sensor, valid, sampling_rate_hz, tone):
                  below_harmonics)
 
 
-def _steady(values, omega):
+def _steady(values, used, middle, time, omega):
     """Where the moving complex amplitude is that of the middle."""
     n = len(values)
-    turned = (values - np.mean(values)) * np.exp(-1j * omega * np.arange(n))
+    columns = np.stack([np.cos(omega * time), np.sin(omega * time), np.ones(n)], axis=1)
+    found = _least_squares(columns[middle], values[middle])
+    # a missing sample must not look like a change
+    filled = np.where(used, values, columns @ found) - found[2]
+    turned = filled * np.exp(-1j * omega * time)
     # over periods the mean and the mirrored frequency average out; they are no whole numbers of
     # samples, and each further pass takes more of what is left
     periods = max(1, round(n * omega / (2 * np.pi) / 80))
@@ -163,7 +172,8 @@ def _noise_at(omega, residual, time):
     beside = beside[(beside > 1.5 * spacing) & (beside < np.pi)]
     angle = np.outer(beside, time)
     power = (np.cos(angle) @ residual)**2 + (np.sin(angle) @ residual)**2
-    return np.mean(power) / len(residual)
+    # one less in the mean: the spread of a Student distribution (JCGM 101:2008, 6.4.9)
+    return np.sum(power) / max(len(beside) - 1, 1) / len(residual)
 
 
 def _least_squares(columns, values):
