@@ -67,6 +67,7 @@ def test_every_kind_of_figure_is_drawn(tmp_path):
     page = Page("Every kind of figure")
     page.section("All").figure(figures.bode(curve, points, modelled)).figure(
         figures.response_deviation(curve, points, modelled)).figure(
+        figures.response_interval(curve)).figure(
         figures.time_signals(time_s, {"a": signal, "b": -signal}, 0.1 * signal)).figure(
         figures.spectra(frequency, {"a": frequency**-0.5}, level=0.05)).figure(
         figures.correlation(np.arange(50), rng.standard_normal(50) / 10, 0.2)).figure(
@@ -76,7 +77,7 @@ def test_every_kind_of_figure_is_drawn(tmp_path):
     page.write(tmp_path / "page.html")
     dom, console = browser.open_page(tmp_path / "page.html")
     assert not console
-    assert len(require_drawn(dom)) == 7
+    assert len(require_drawn(dom)) == 8
     # no button that would send the data anywhere
     assert set(re.findall(r'data-title="([^"]*)"', dom)) <= BUTTONS
 

@@ -73,6 +73,9 @@ def test_bode_puts_points_on_the_branch_of_the_model():
     np.testing.assert_allclose(numbers(phase.y), np.degrees(0.1))
     band = next(trace for trace in deviation.data if trace.name == "95 % interval")
     assert numbers(band.y).max() == pytest.approx(2.0)
+    amplitude, phase = figures.response_interval(curve).data
+    np.testing.assert_allclose(numbers(amplitude.y), 2.0)
+    np.testing.assert_allclose(numbers(phase.y), np.degrees(0.1))
 
 
 def test_correlation_draws_each_lag_and_the_bound():

@@ -1,15 +1,32 @@
 """`identify --report` tells what `identify` found, and refuses early what it could not write."""
 
+import base64
 import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from frac_accel import SensorModel
 from frac_accel.cli import main
 from frac_accel.report.quantity import percent, rounded
+from frac_accel.uncertainty import response_uncertainty
 
 BAG = Path(__file__).resolve().parents[1] / "bags" / "viscoelastic_bench.mcap"
+
+
+def traces(text):
+    """All traces of a page."""
+    for content in re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', text):
+        yield from json.loads(content)["data"]
+
+
+def values(entry):
+    """Numbers of a trace, which plotly 6 and newer writes in base64."""
+    if isinstance(entry, dict):
+        return np.frombuffer(base64.b64decode(entry["bdata"]), entry["dtype"])
+    return np.array(entry, float)
 
 
 @pytest.mark.parametrize("structure", ["fractional", "arx"])
@@ -24,6 +41,13 @@ def test_page_tells_what_was_found(tmp_path, structure):
         assert re.search(rf"<td[^>]*>{name}</td><td[^>]*>{re.escape(value)}</td>"
                          rf"<td[^>]*>{re.escape(std or '–')}</td>", text)
     assert found["reason"] in text
+    known = response_uncertainty(SensorModel.load(files["m.yaml"]), [10.0, 200.0], "y")
+    band = next(trace for trace in traces(text) if trace["name"] == "95 % interval")
+    # the outline: along the upper limit, and back along the lower one
+    (x, back), (high, low) = (np.split(values(band[axis]), 2) for axis in "xy")
+    shown = np.stack([np.interp([10.0, 200.0], back[::-1], low[::-1]),
+                      np.interp([10.0, 200.0], x, high)], axis=1)
+    np.testing.assert_allclose(shown, known.amplitude_interval, rtol=1e-3)
     for part in (found["model"]["provenance"]["sha256"], BAG.name, "--axis y",
                  f"{found['nrmse']:.3%}", f"{found['held_out_nrmse']:.3%}"):
         assert part in text

@@ -5,6 +5,7 @@ from scipy.signal import coherence, welch
 
 from ..identification.excitation import strongest_stretch
 from ..model import AXES
+from ..uncertainty import response_uncertainty
 from . import figures
 from .page import Page
 from .quantity import percent, rounded
@@ -122,10 +123,14 @@ def _response(section, result, axis):
     lowest = low or (points.frequency_hz[0] if points else high / 1000)
     frequency = np.geomspace(min(lowest, points.frequency_hz[0]) if points else lowest,
                              max(high, points.frequency_hz[-1]) if points else high, _FREQUENCIES)
-    curve = _curve(model, frequency, axis)
+    curve, method = _curve(model, frequency, axis)
     modelled = model.frequency_response(points.frequency_hz, axis) if points else None
     section.figure(figures.bode(curve, points, modelled),
-                   "Frequency response of the model" + (_measured(points) if points else "."))
+                   "Frequency response of the model, its 95 % interval from the uncertainty of the "
+                   f"parameters ({method})" + (_measured(points) if points else "."))
+    section.figure(figures.response_interval(curve),
+                   "Expanded uncertainty (k = 2, 95 %) of the model's amplitude and phase, from "
+                   "the uncertainty of its parameters.")
     if not points:
         return
     section.figure(figures.response_deviation(curve, points, modelled),
@@ -186,7 +191,13 @@ def _residual(section, result, reference, sensor, pair):
 
 
 def _curve(model, frequency_hz, axis):
-    return figures.ResponseCurve(frequency_hz, model.frequency_response(frequency_hz, axis))
+    """The model's response with the interval that the parameters' uncertainty gives it."""
+    known = response_uncertainty(model, frequency_hz, axis)
+    around = known.phase_interval_deg - known.phase_deg[:, None]
+    return figures.ResponseCurve(
+        frequency_hz, model.frequency_response(frequency_hz, axis),
+        tuple((known.amplitude_interval / known.amplitude[:, None] - 1).T),
+        tuple(np.radians(around).T)), known.method
 
 
 def _sentence(words):
