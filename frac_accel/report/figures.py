@@ -134,6 +134,27 @@ def response_interval(curve):
     return figure
 
 
+def mark_band(figure, band_hz):
+    """Mark the ends of a frequency band in a figure over frequency.
+
+    Parameters
+    ----------
+    figure : plotly.graph_objects.Figure
+    band_hz : sequence of two float
+        An end at zero is not marked: no logarithmic axis has it.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+        The same.
+    """
+    for end in band_hz:
+        if end > 0:
+            figure.add_shape(type="line", x0=end, x1=end, xref="x", y0=0, y1=1, yref="paper",
+                             line={"color": MEASURED, "width": 1, "dash": "dash"})
+    return figure
+
+
 def time_signals(time_s, signals, residual=None, unit="output units"):
     """Signals over time, and below them what is left.
 

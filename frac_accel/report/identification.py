@@ -101,8 +101,9 @@ def _excitation(section, result, reference, sensor, pair):
     section.text(_sentence(result.excitation["words"]))
     section.text(f"{len(pair)} samples at {rate:.6g} Hz ({len(pair) / rate:.4g} s), of which "
                  f"{int(pair.valid.sum())} in both topics. The reference has power, and the sensor "
-                 f"answers to it, from {low:.4g} Hz to {high:.4g} Hz: there the model holds. "
-                 f"Acceleration without its mean: {rms:.4g} m/s² RMS, {peak:.4g} m/s² peak.")
+                 f"answers to it, from {low:.4g} Hz to {high:.4g} Hz; elsewhere the model is "
+                 f"extrapolated. Acceleration without its mean: {rms:.4g} m/s² RMS, {peak:.4g} "
+                 "m/s² peak.")
     size = _segment(len(pair))
     frequency, power = welch(reference, rate, "hann", size)
     section.figure(
@@ -125,17 +126,20 @@ def _response(section, result, axis):
                              max(high, points.frequency_hz[-1]) if points else high, _FREQUENCIES)
     curve, method = _curve(model, frequency, axis)
     modelled = model.frequency_response(points.frequency_hz, axis) if points else None
-    section.figure(figures.bode(curve, points, modelled),
-                   "Frequency response of the model, its 95 % interval from the uncertainty of the "
-                   f"parameters ({method})" + (_measured(points) if points else "."))
-    section.figure(figures.response_interval(curve),
-                   "Expanded uncertainty (k = 2, 95 %) of the model's amplitude and phase, from "
-                   "the uncertainty of its parameters.")
+
+    def add(figure, caption):
+        section.figure(figures.mark_band(figure, (low, high)), caption)
+    add(figures.bode(curve, points, modelled),
+        "Frequency response of the model, its 95 % interval from the uncertainty of the "
+        f"parameters ({method})" + (_measured(points) if points else ".")
+        + f" Beyond the dashed lines, {low:.4g} Hz and {high:.4g} Hz, the model is extrapolated.")
+    add(figures.response_interval(curve),
+        "Expanded uncertainty (k = 2, 95 %) that the parameters give the model's amplitude and "
+        "phase. What the model leaves out is not in it: see the residual.")
     if not points:
         return
-    section.figure(figures.response_deviation(curve, points, modelled),
-                   "The measured response relative to the model's. Bars and bands are 95 % "
-                   "intervals (k = 2).")
+    add(figures.response_deviation(curve, points, modelled),
+        "The measured response relative to the model's. Bars and bands are 95 % intervals (k = 2).")
     if points.distortion:
         section.text(_sentence(points.distortion["words"]))
     if result.frequency_domain:
