@@ -2,13 +2,11 @@
 
 import dataclasses
 import difflib
-import os
-import tempfile
-from pathlib import Path
 
 import numpy as np
 import yaml
 
+from .atomic_file import write_text
 from .core import CORES
 from .effects import known_effects
 from .errors import ModelError
@@ -244,21 +242,10 @@ class SensorModel:
 
     def save(self, path):
         """Write the model as YAML; the file is complete or not there."""
-        path = Path(path)
         text = yaml.safe_dump(self.to_dict(), sort_keys=False, allow_unicode=True)
-        temporary = None
         try:
-            handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-            with open(handle, "w", encoding="utf-8") as file:
-                file.write(text)
-            # mkstemp makes the file for its owner alone
-            umask = os.umask(0)
-            os.umask(umask)
-            os.chmod(temporary, 0o666 & ~umask)
-            os.replace(temporary, path)
+            write_text(path, text)
         except OSError as error:
-            if temporary:
-                os.unlink(temporary)
             raise ModelError(f"{path}: cannot write the model: {error.strerror}") from None
 
 

@@ -51,6 +51,8 @@ class Identification:
         where that part holds no signal.
     notes : list of str
         What a user must know before trusting the model.
+    residual : ndarray, shape (n,)
+        Measured less simulated [output units]; NaN where not judged.
     excitation : dict
         ``kind`` of excitation found in the record, and ``words`` for it.
     points : ResponsePoints or None
@@ -67,6 +69,7 @@ class Identification:
     nrmse: float
     held_out_nrmse: float
     notes: list
+    residual: np.ndarray
     excitation: dict
     points: ResponsePoints | None
     frequency_domain: dict | None
@@ -211,7 +214,7 @@ def _identification(chosen, reason, data, axis, provenance):
            if isinstance(fit, ArxFit) else {}),
     })
     return Identification(model, chosen.name, reason, parameters, chosen.nrmse,
-                          chosen.held_out_nrmse, notes, data.response.excitation,
+                          chosen.held_out_nrmse, notes, fit.residual, data.response.excitation,
                           data.response.points, compared)
 
 
