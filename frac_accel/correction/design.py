@@ -287,7 +287,9 @@ def plateau(axis, band_hz=None):
     if isinstance(core, Oscillator):
         own = core.sensitivity
     elif band_hz is None:
-        own = core.reference_gain()
+        # the polarity of the limit, since orders below zero leave s = 0 itself undefined
+        own = np.copysign(core.reference_gain(),
+                          core.transfer_function(np.array([1e-9 + 0j]))[0].real)
     else:
         low, high = band_hz
         frequency = np.geomspace(max(low, high / _WIDEST), high, 500)
