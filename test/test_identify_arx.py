@@ -75,9 +75,9 @@ def test_a_longer_record_is_more_accurate():
     rng = np.random.default_rng(40262)
     short, long = [], []
     for _ in range(6):
-        sensor, record = measured(rng, "arx", duration_s=16.0)
+        sensor, record = measured(rng, "arx", duration_s=12.0)
         start = (TRUE_ORDERS, np.r_[sensor.core["denominator"][1:], sensor.core["numerator"]])
-        for errors, part in ((short, slice(2000)), (long, slice(32000))):
+        for errors, part in ((short, slice(1500)), (long, slice(24000))):
             reference, output = columns(pair_of(record))
             fit = fit_arx(reference[part], output[part], RATE_HZ, start=start)
             errors.append(error(fit.core().transfer_function(S), sensor))
@@ -112,7 +112,8 @@ def test_intervals_of_the_response_cover_the_truth_whatever_the_orders(kind, eff
     rng = np.random.default_rng(40276)
     scores = []
     for i in range(10):
-        sensor, record = measured(rng, kind, rng.uniform(20, 40), ((), (0.9,))[i % 2], effects)
+        sensor, record = measured(rng, kind, rng.uniform(20, 40), ((), (0.9,))[i % 2], effects,
+                                  duration_s=2.5)
         fit = fit_arx(*columns(pair_of(record)), RATE_HZ)
         count = fit.orders.coefficients
         a, b = np.split(fit.values[:count], [fit.orders.poles])
@@ -135,7 +136,7 @@ def test_true_orders_are_found():
     rng = np.random.default_rng(40264)
     found = []
     for _ in range(10):
-        _, record = measured(rng, "arx", snr_db=50.0)
+        _, record = measured(rng, "arx", snr_db=50.0, duration_s=2.5)
         pair = pair_of(record)
         orders = fit_arx(*columns(pair), RATE_HZ).orders
         # the numerator has one more at either end than was chosen
