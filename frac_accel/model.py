@@ -7,10 +7,10 @@ import numpy as np
 import yaml
 
 from .atomic_file import write_text
-from .core import CORES
+from .core import CORES, Arx
 from .effects import known_effects
 from .errors import ModelError
-from .parameters import as_mapping, build, number, plain
+from .parameters import as_mapping, build, number, parameter_fields, plain
 
 SCHEMA = "frac_accel/sensor_model/1"
 AXES = "xyz"
@@ -322,6 +322,12 @@ def _core(entry, where):
     kind = entry.pop("type", "oscillator")
     if not isinstance(kind, str) or kind not in CORES:
         raise ModelError(f"{where}.type: {kind!r} given, expected one of {', '.join(CORES)}")
+    if CORES[kind] is not Arx:
+        for field in parameter_fields(Arx):
+            if field.name in entry:
+                raise ModelError(f"{where}.{field.name}: given for a core of type {kind}, but it "
+                                 "belongs to a transfer function in z: expected type: arx; "
+                                 "coefficients in z have no place in an equation in s")
     try:
         return build(CORES[kind], entry, where)
     except ModelError as error:

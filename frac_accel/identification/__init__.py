@@ -16,6 +16,7 @@ from ..parameters import parameter_fields, unit_of
 from ..simulation import simulate
 from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
 from .excitation import excited_band, learning_length, require_excitation
+from .frequency_response import linear_share
 from .measured_response import MeasuredResponse
 from .output_error import Fit, fit_output_error
 from .points import ResponsePoints, response_points
@@ -27,6 +28,8 @@ __all__ = ["STRUCTURES", "Identification", "ResponsePoints", "identify", "respon
 _UNDETERMINED = 0.2
 # Standard uncertainties by which the damping order must differ from 1 to be called fractional.
 _SIGNIFICANT = 3.0
+# Share of an oscillator's held-out residual that a model which names no cause may leave.
+_CLEARLY = 0.7
 _STRUCTURES = {"arx": ArxStructure(), "oscillator": OscillatorStructure(),
                "fractional": FractionalStructure()}
 STRUCTURES = ("auto", *_STRUCTURES)
@@ -94,8 +97,9 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None):
     axis : {"x", "y", "z"}
     structure : {"auto", "arx", "oscillator", "fractional"}
         Rational transfer function in z, classical seismic sensor, one with a damping of free
-        order, or the choice between the last two: the fractional one only where its order differs
-        from 1 by three standard uncertainties and it predicts held-out data better.
+        order, or the choice between them: the fractional one only where its order differs from 1 by
+        three standard uncertainties and it predicts held-out data better; the one in z, which names
+        no cause, only where it predicts them clearly better than both.
     provenance : dict, optional
         Where the data come from; becomes part of the model.
     progress : callable, optional
@@ -172,22 +176,40 @@ class _Candidate:
 
 
 def _choose(data):
-    """The better of classical and fractional, and why."""
+    """The best of the structures, and why."""
+    chosen, best, reason = _choose_oscillator(data)
+    if linear_share(data.reference, chosen.fit.residual) < 1 - _CLEARLY**2:
+        return chosen, reason
+    try:
+        arx = _Candidate.of("arx", data)
+    except IdentificationError:
+        return chosen, reason
+    held_out = f"held-out residual {arx.held_out_nrmse:.3%} against {best:.3%}"
+    if not arx.held_out_nrmse < _CLEARLY * best:
+        return chosen, (f"{reason}; a free transfer function in z does not predict clearly better: "
+                        f"{held_out}")
+    return arx, ("it predicts clearly better than an oscillator with classical or fractional "
+                 f"damping: {held_out}; something else acts, which its coefficients cannot name")
+
+
+def _choose_oscillator(data):
+    """The better of classical and fractional, the smallest held-out residual, and why."""
     classical = _Candidate.of("oscillator", data)
     try:
         fractional = _Candidate.of("fractional", data)
     except IdentificationError as error:
-        return classical, f"the data cannot tell more: {error}"
+        return classical, classical.held_out_nrmse, f"the data cannot tell more: {error}"
+    best = min(classical.held_out_nrmse, fractional.held_out_nrmse)
     order = fractional.fit["damping_order"]
     std = fractional.fit.std[fractional.fit.names.index("damping_order")]
     score = f"damping order {order:.4g} +- {std:.2g}"
     held_out = (f"held-out residual {fractional.held_out_nrmse:.3%} against "
                 f"{classical.held_out_nrmse:.3%} of the classical model")
     if abs(order - 1) <= _SIGNIFICANT * std:
-        return classical, f"a fractional damping is not significant: {score}"
+        return classical, best, f"a fractional damping is not significant: {score}"
     if not fractional.held_out_nrmse < classical.held_out_nrmse:
-        return classical, f"a fractional damping does not predict better: {held_out}"
-    return fractional, f"{score} differs from 1; {held_out}"
+        return classical, best, f"a fractional damping does not predict better: {held_out}"
+    return fractional, best, f"{score} differs from 1; {held_out}"
 
 
 def _identification(chosen, reason, data, axis, provenance):
