@@ -42,6 +42,7 @@ setup(
         "mcap>=1.6.0",  # Writer.flush
         "tqdm",
         "matplotlib",
+        "plotly>=5.13",
     ],
     entry_points={
         "console_scripts": [

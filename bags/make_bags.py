@@ -28,6 +28,12 @@ FRACTIONAL = rig.Sensor(
              "cross_axis_sensitivity": {"x": 0.015, "y": -0.02, "z": 0.01},
              "offset": {"offset": 0.12}})
 
+# One whose damping is all that is unusual about it: what `identify` can tell from one axis.
+VISCOELASTIC = rig.Sensor(
+    core={"type": "oscillator", "natural_frequency_hz": 110.0, "damping_ratio": 0.22,
+          "damping_order": 0.6, "sensitivity": 0.96},
+    effects={"time_delay": {"delay_s": 0.0023}, "offset": {"offset": 0.12}})
+
 # A laboratory sensor on a shaker, one axis.
 CLASSICAL = rig.Sensor(
     core={"type": "oscillator", "natural_frequency_hz": 180.0, "damping_ratio": 0.15,
@@ -44,6 +50,8 @@ def main():
     write("classical_bench", CLASSICAL, excitation, rng, snr_db=40)
     excitation = rig.sines(RATE_HZ, 1.0, [300.0], [0.0], (3.0, 0.0, 0.0), lead_s=1.0)
     write("one_sine", CLASSICAL, excitation, rng, snr_db=40)
+    excitation = rig.band_noise(rng, RATE_HZ, 4.0, (1.0, 250.0), (2.0, 1.5, 3.0), lead_s=2.0)
+    write("viscoelastic_bench", VISCOELASTIC, excitation, rng, snr_db=60)
 
 
 def write(name, sensor, excitation, rng, snr_db):

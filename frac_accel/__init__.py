@@ -13,6 +13,8 @@ _HOME = {
     "Corrector": "correction.corrector",
     "LiveSimulator": "live_simulation",
     "error_metrics": "metrics",
+    "response_uncertainty": "uncertainty",
+    "corrected_uncertainty": "uncertainty",
     "read_bag": "bag",
     "write_bag": "bag",
     "FracAccelError": "errors",

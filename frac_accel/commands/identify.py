@@ -2,14 +2,17 @@
 
 from ..identification import STRUCTURES, identify
 from ..pair import load_pair
+from ..report.identification import identification_page
 from ._common import (
     add_bag,
     add_json,
+    add_report,
     add_topics,
     open_bag,
     progress,
     provenance,
     require_output,
+    require_report,
     step,
     write_json,
 )
@@ -22,6 +25,7 @@ def add_arguments(parser):
                         help="form of the model; auto chooses on held-out data "
                              "(default: %(default)s)")
     parser.add_argument("-o", "--output", required=True, metavar="M.yaml", help="model to write")
+    add_report(parser)
     add_topics(parser)
     add_json(parser)
 
@@ -29,17 +33,22 @@ def add_arguments(parser):
 def run(arguments):
     """Do it."""
     require_output(arguments.output, arguments.bag)
+    require_report(arguments.report, arguments.bag)
     open_bag(arguments.bag)
     pair = load_pair(arguments.bag, arguments.reference, arguments.sensor, arguments.axis)
     command = (f"frac_accel identify {arguments.bag} --structure {arguments.structure} --reference "
                f"{arguments.reference} --sensor {arguments.sensor} --axis {arguments.axis}")
+    source = provenance(arguments.bag, command)
     with progress(None, unit="step") as bar:
-        result = identify(pair, arguments.axis, arguments.structure,
-                          provenance(arguments.bag, command), lambda words: step(bar, words))
+        result = identify(pair, arguments.axis, arguments.structure, source,
+                          lambda words: step(bar, words))
     result.model.save(arguments.output)
     low, high = result.model.band_hz
     print(f"{len(pair)} samples at {pair.sampling_rate_hz:.6g} Hz, excited from {low:.4g} to "
           f"{high:.4g} Hz")
+    print(result.excitation["words"])
+    if result.excitation["kind"] == "multisine" and result.points and result.points.distortion:
+        print(result.points.distortion["words"])
     print(f"{result.structure}: {result.reason}")
     for name, entry in result.parameters.items():
         print(f"  {name:21} {entry['value']:12.6g} +- {entry['std']:.2g} {entry['unit']}")
@@ -48,4 +57,7 @@ def run(arguments):
     for note in result.notes:
         print(f"note: {note}")
     print(f"{arguments.output}: written")
+    if arguments.report:
+        identification_page(result, pair, arguments.axis, source).write(arguments.report)
+        print(f"{arguments.report}: written")
     write_json(arguments.json, result.as_dict())

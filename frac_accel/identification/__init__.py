@@ -16,15 +16,20 @@ from ..parameters import parameter_fields, unit_of
 from ..simulation import simulate
 from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
 from .excitation import excited_band, learning_length, require_excitation
+from .frequency_response import linear_share
+from .measured_response import MeasuredResponse
 from .output_error import Fit, fit_output_error
+from .points import ResponsePoints, response_points
 from .structures import FractionalStructure, OscillatorStructure
 
-__all__ = ["STRUCTURES", "Identification", "identify"]
+__all__ = ["STRUCTURES", "Identification", "ResponsePoints", "identify", "response_points"]
 
 # A standard uncertainty above this share of its value: the data do not determine the parameter.
 _UNDETERMINED = 0.2
 # Standard uncertainties by which the damping order must differ from 1 to be called fractional.
 _SIGNIFICANT = 3.0
+# Share of an oscillator's held-out residual that a model which names no cause may leave.
+_CLEARLY = 0.7
 _STRUCTURES = {"arx": ArxStructure(), "oscillator": OscillatorStructure(),
                "fractional": FractionalStructure()}
 STRUCTURES = ("auto", *_STRUCTURES)
@@ -49,6 +54,15 @@ class Identification:
         where that part holds no signal.
     notes : list of str
         What a user must know before trusting the model.
+    residual : ndarray, shape (n,)
+        Measured less simulated [output units]; NaN where not judged.
+    excitation : dict
+        ``kind`` of excitation found in the record, and ``words`` for it.
+    points : ResponsePoints or None
+        Frequency response of the pair without a model; None where the record gives none.
+    frequency_domain : dict or None
+        The same structure fitted to the points, and how far its parameters are from those above
+        (`compare_domains`); None for ARX and without points.
     """
 
     model: SensorModel
@@ -58,12 +72,19 @@ class Identification:
     nrmse: float
     held_out_nrmse: float
     notes: list
+    residual: np.ndarray
+    excitation: dict
+    points: ResponsePoints | None
+    frequency_domain: dict | None
 
     def as_dict(self):
         """Plain numbers, lists and the model's content."""
         return {"model": self.model.to_dict(), "structure": self.structure,
                 "reason": self.reason, "parameters": self.parameters,
-                "nrmse": self.nrmse, "held_out_nrmse": self.held_out_nrmse, "notes": self.notes}
+                "nrmse": self.nrmse, "held_out_nrmse": self.held_out_nrmse, "notes": self.notes,
+                "excitation": self.excitation,
+                "points": None if self.points is None else self.points.as_dict(),
+                "frequency_domain": self.frequency_domain}
 
 
 def identify(pair, axis="x", structure="auto", provenance=None, progress=None):
@@ -76,8 +97,9 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None):
     axis : {"x", "y", "z"}
     structure : {"auto", "arx", "oscillator", "fractional"}
         Rational transfer function in z, classical seismic sensor, one with a damping of free
-        order, or the choice between the last two: the fractional one only where its order differs
-        from 1 by three standard uncertainties and it predicts held-out data better.
+        order, or the choice between them: the fractional one only where its order differs from 1 by
+        three standard uncertainties and it predicts held-out data better; the one in z, which names
+        no cause, only where it predicts them clearly better than both.
     provenance : dict, optional
         Where the data come from; becomes part of the model.
     progress : callable, optional
@@ -97,7 +119,7 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None):
                              f"{', '.join(STRUCTURES)}")
     if isinstance(pair, (str, Path)):
         pair = load_pair(pair, axis=axis)
-    data = _Data.of(pair, AXES.index(axis), progress or (lambda words: None))
+    data = _Data.of(pair, axis, progress or (lambda words: None))
     if structure == "auto":
         chosen, reason = _choose(data)
     else:
@@ -111,14 +133,20 @@ class _Data:
     reference: np.ndarray
     sensor: np.ndarray
     spread: float
+    response: MeasuredResponse
     progress: Callable
 
     @classmethod
-    def of(cls, pair, column, progress):
-        sensor = pair.sensor[:, column]
-        return cls(pair, pair.reference[:, column], sensor, float(np.std(sensor)), progress)
+    def of(cls, pair, axis, progress):
+        column = AXES.index(axis)
+        reference, sensor = pair.reference[:, column], pair.sensor[:, column]
+        progress("measuring the frequency response")
+        return cls(pair, reference, sensor, float(np.std(sensor)), MeasuredResponse.of(pair, axis),
+                   progress)
 
     def fit(self, structure, part=slice(None), start=None):
+        if start is None:
+            start = self.response.start(structure)
         record = (self.reference[part], self.sensor[part], self.pair.sampling_rate_hz,
                   self.pair.valid[part], self.pair.lag_s, start)
         if isinstance(structure, ArxStructure):
@@ -148,22 +176,40 @@ class _Candidate:
 
 
 def _choose(data):
-    """The better of classical and fractional, and why."""
+    """The best of the structures, and why."""
+    chosen, best, reason = _choose_oscillator(data)
+    if linear_share(data.reference, chosen.fit.residual) < 1 - _CLEARLY**2:
+        return chosen, reason
+    try:
+        arx = _Candidate.of("arx", data)
+    except IdentificationError:
+        return chosen, reason
+    held_out = f"held-out residual {arx.held_out_nrmse:.3%} against {best:.3%}"
+    if not arx.held_out_nrmse < _CLEARLY * best:
+        return chosen, (f"{reason}; a free transfer function in z does not predict clearly better: "
+                        f"{held_out}")
+    return arx, ("it predicts clearly better than an oscillator with classical or fractional "
+                 f"damping: {held_out}; something else acts, which its coefficients cannot name")
+
+
+def _choose_oscillator(data):
+    """The better of classical and fractional, the smallest held-out residual, and why."""
     classical = _Candidate.of("oscillator", data)
     try:
         fractional = _Candidate.of("fractional", data)
     except IdentificationError as error:
-        return classical, f"the data cannot tell more: {error}"
+        return classical, classical.held_out_nrmse, f"the data cannot tell more: {error}"
+    best = min(classical.held_out_nrmse, fractional.held_out_nrmse)
     order = fractional.fit["damping_order"]
     std = fractional.fit.std[fractional.fit.names.index("damping_order")]
     score = f"damping order {order:.4g} +- {std:.2g}"
     held_out = (f"held-out residual {fractional.held_out_nrmse:.3%} against "
                 f"{classical.held_out_nrmse:.3%} of the classical model")
     if abs(order - 1) <= _SIGNIFICANT * std:
-        return classical, f"a fractional damping is not significant: {score}"
+        return classical, best, f"a fractional damping is not significant: {score}"
     if not fractional.held_out_nrmse < classical.held_out_nrmse:
-        return classical, f"a fractional damping does not predict better: {held_out}"
-    return fractional, f"{score} differs from 1; {held_out}"
+        return classical, best, f"a fractional damping does not predict better: {held_out}"
+    return fractional, best, f"{score} differs from 1; {held_out}"
 
 
 def _identification(chosen, reason, data, axis, provenance):
@@ -171,7 +217,8 @@ def _identification(chosen, reason, data, axis, provenance):
     low, high = excited_band(data.reference, data.sensor, rate)
     parameters = {name: {"value": float(value), "std": float(std), "unit": _unit(name)}
                   for name, value, std in zip(fit.names, fit.values, fit.std)}
-    notes = _notes(parameters, chosen, data, high)
+    compared, more = data.response.compared(chosen.structure, fit)
+    notes = _notes(parameters, chosen, data, high) + data.response.notes + more
     effects = [TimeDelay(fit["delay_s"])]
     if abs(fit["offset"]) > _SIGNIFICANT * parameters["offset"]["std"]:
         effects.append(Offset(fit["offset"]))
@@ -189,7 +236,8 @@ def _identification(chosen, reason, data, axis, provenance):
            if isinstance(fit, ArxFit) else {}),
     })
     return Identification(model, chosen.name, reason, parameters, chosen.nrmse,
-                          chosen.held_out_nrmse, notes)
+                          chosen.held_out_nrmse, notes, fit.residual, data.response.excitation,
+                          data.response.points, compared)
 
 
 def _unit(name):

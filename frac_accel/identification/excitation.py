@@ -97,6 +97,16 @@ def learning_length(reference):
     return int(np.searchsorted(energy, _LEARN * energy[-1]))
 
 
+def alternating_stretches(reference, count):
+    """Every other of `count` stretches in which the reference has equal energy, as a mask.
+
+    What is learnt from the others is judged under the same kind of motion: the end of a shock is
+    not like its beginning.
+    """
+    energy = _energy(reference)
+    return (energy * (count / max(energy[-1], 1e-300))).astype(int) % 2 == 1
+
+
 def _energy(reference):
     return np.cumsum(np.square(reference - reference.mean()))
 

@@ -40,6 +40,9 @@ def sandwich(jacobian, residual, used):
     columns = spectra[:-1]
     meat = np.real((np.conj(columns) * (twice * smooth)) @ columns.T) / length
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    bread = (vectors / np.maximum(values, 1e-15 * values[-1])) @ vectors.T
+    bread = (vectors / np.maximum(values, 1e-14 * values[-1])) @ vectors.T
+    # as a square, so that rounding makes no variance negative
+    strengths, directions = np.linalg.eigh(meat)
+    root = bread @ (directions * np.sqrt(np.maximum(strengths, 0))) / scale[:, None]
     freedom = len(residual) / max(len(residual) - jacobian.shape[1], 1)
-    return freedom * bread @ meat @ bread / np.outer(scale, scale)
+    return freedom * root @ root.T
