@@ -4,7 +4,7 @@ import numpy as np
 from scipy.fft import rfft
 from scipy.ndimage import uniform_filter1d
 
-from ..identification.excitation import learning_length, strongest_stretch
+from ..identification.excitation import alternating_stretches, learning_length, strongest_stretch
 from ..identification.uncertainty import sandwich
 from .gain import gain
 from .leftover import leftover
@@ -17,6 +17,9 @@ _CHANCE = 30.0
 _RIVALS = 4
 # Records of more samples are searched in part first.
 _LONG = 40_000
+# A last part with less than this of the motion before it proves little; stretches instead of it.
+_QUIET_END = 0.5
+_STRETCHES = 20
 
 
 def noise_peak(residual, used):
@@ -24,6 +27,19 @@ def noise_peak(residual, used):
     power = np.abs(rfft(residual))**2
     smooth = uniform_filter1d(power, max(5, len(power) // 64), mode="reflect")
     return float(max(smooth.max() / smooth.mean(), 1.0))
+
+
+def held_out(reference):
+    """Which samples are held out, as a mask.
+
+    The last ones, from where a share of the reference's energy has come; where these are quiet, as
+    after a shock, every other stretch.
+    """
+    last = np.arange(len(reference)) >= learning_length(reference)
+    moving = reference - reference.mean()
+    if np.std(moving[last]) < _QUIET_END * np.std(moving[~last]):
+        return alternating_stretches(reference, _STRETCHES)
+    return last
 
 
 class Engine:
@@ -34,7 +50,7 @@ class Engine:
         self._wanted = used
         keywords = {"candidates": candidates} if candidates else {}
         self.search = Search(self.problem, base, log=log, **keywords)
-        self.split = learning_length(record.reference[:, axis])
+        self.held_out_rows = used & self.problem.used & held_out(record.reference[:, axis])
         self._learnt = {}
         # what the numerics of the simulation may still be wrong by
         self.floor = 3e-5 * float(np.std(record.sensor[used, axis]))
@@ -66,8 +82,8 @@ class Engine:
                            self.search.base, self.search.candidates, self.search.log).run(seed)
             seed = {cause: effect for cause, effect in found.effects.items()
                     if cause not in self.search.base}
-        best = self.search.run(self.threshold, lambda fitted: self.left(fitted).share == 0, seed)
-        return self.compete(best)
+            return self.search.run(self.threshold, self.noise_only, seed, most=1)
+        return self.compete(self.search.run(self.threshold, self.noise_only, seed))
 
     def score(self, fitted, variance):
         """Cost with a penalty for each parameter, in units of the noise's variance."""
@@ -105,33 +121,45 @@ class Engine:
         """Standard uncertainties by cause and parameter, for any spectrum of the residual."""
         if not fitted.unknowns:
             return {}
-        jacobian = fitted.jacobian.copy()
+        jacobian, used = fitted.jacobian.copy(), self.problem.used
         for i, unknown in enumerate(fitted.unknowns):
             value = getattr(fitted.effects[unknown.cause], unknown.name)
             jacobian[:, i] /= value if unknown.logarithmic else unknown.scale
-        used = self.problem.used
-        covariance = sandwich(jacobian[used], fitted.residual[used], used)
+        stds = np.full(len(fitted.unknowns), np.inf)
+        # what does not change the output at all, the record leaves open
+        felt = np.linalg.norm(jacobian, axis=0) > 0
+        if felt.any():
+            covariance = sandwich(jacobian[np.ix_(used, felt)], fitted.residual[used], used)
+            stds[felt] = np.sqrt(np.maximum(np.diag(covariance), 0))
         result = {}
-        for unknown, variance in zip(fitted.unknowns, np.diag(covariance)):
-            result.setdefault(unknown.cause, {})[unknown.name] = float(np.sqrt(max(variance, 0)))
+        for unknown, std in zip(fitted.unknowns, stds):
+            result.setdefault(unknown.cause, {})[unknown.name] = float(std)
         return result
 
     def learnt(self, fitted):
         """The same causes, fitted to the learning part of the record only."""
         if fitted.causes not in self._learnt:
-            learn = self.problem.used.copy()
-            learn[self.split:] = False
-            part = self.problem.restricted(learn)
+            part = self.problem.restricted(self.problem.used & ~self.held_out_rows)
             self._learnt[fitted.causes] = part.fit(fitted.effects, iterations=6)
         return self._learnt[fitted.causes]
 
-    def held_out(self, best, cause):
-        """Gain of a fitted cause on the part of the record that its fit has not seen."""
-        rest = self.problem.used.copy()
-        rest[:self.split] = False
-        errors = [(self.problem.measured - self.learnt(fit).simulated)[rest]
-                  for fit in (self.search.without(best, cause), best)]
+    def held_out(self, best, cause, step=None):
+        """Gain of a fitted cause on the part of the record that its fit has not seen.
+
+        With the `step` of a coarse lattice the simulated values are put on it too: what rounding
+        does to small signals is no other cause's merit.
+        """
+        errors = []
+        for fit in (self.search.without(best, cause), best):
+            simulated = self.learnt(fit).simulated
+            if step:
+                simulated = step * np.round(simulated / step)
+            errors.append((self.problem.measured - simulated)[self.held_out_rows])
         return gain(*errors)
+
+    def noise_only(self, fitted):
+        """Whether a fit leaves nothing but noise."""
+        return self.left(fitted).share == 0
 
     def left(self, fitted):
         """What the residual still holds."""

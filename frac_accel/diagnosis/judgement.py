@@ -7,7 +7,6 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import resample_poly
 
 from ..effects import known_effects
-from ..identification.excitation import learning_length
 from ..model import AXES, AxisModel, SensorModel
 from ..pair import clean
 from ..parameters import parameter_fields
@@ -156,7 +155,9 @@ def judge(engine, best, found, fixed, loose, sensor):
     base = engine.search.base
     gains = {}
     while True:
-        gains = {cause: engine.held_out(best, cause) for cause in best.effects if cause not in base}
+        step = found.step if _coarse(engine, best, found) else None
+        gains = {cause: engine.held_out(best, cause, step)
+                 for cause in best.effects if cause not in base}
         idle = [cause for cause, g in gains.items()
                 if g.reduction < _RELEVANT or g.ci95[0] <= 0]
         if not idle:
@@ -183,7 +184,7 @@ def judge(engine, best, found, fixed, loose, sensor):
 
 def _verdict(engine, best, left, findings, suspects, found):
     p = engine.problem
-    rest = _held_out_rows(p)
+    rest = engine.held_out_rows
     measured = p.measured[rest]
     spread = float(np.std(measured))
     baseline = engine.search.fit(engine.search.base)
@@ -234,12 +235,6 @@ def _extended(engine, effects):
     return SensorModel(p.baseline.core, p.baseline.effects, axes, p.baseline.metadata)
 
 
-def _held_out_rows(problem):
-    rows = problem.used.copy()
-    rows[:learning_length(problem.record.reference[:, problem.axis])] = False
-    return rows
-
-
 def _rms(error, rows):
     return float(np.sqrt(np.mean(error[rows]**2)))
 
@@ -268,7 +263,7 @@ def _moved(engine, best, loose, stds):
         if farthest < _MOVED:
             continue
         held = engine.problem.simulate({**best.effects, cause: entry.effect})
-        rows = _held_out_rows(engine.problem)
+        rows = engine.held_out_rows
         measured = engine.problem.measured
         g = gain((measured - held)[rows], (measured - best.simulated)[rows])
         if g.ci95[0] > 0 and g.reduction > _RELEVANT:
@@ -281,10 +276,9 @@ def _moved(engine, best, loose, stds):
 def _read_off(engine, best, found, fixed, sensor):
     """Findings that the record shows by itself: limits, lattice, stamps."""
     p, known = engine.problem, known_effects()
-    split = learning_length(p.record.reference[:, p.axis])
+    # clipped samples count here, and nothing was fitted: all samples do
     rows = p.record.valid.copy()
-    rows[:max(split, 1)] = False
-    rows[-64:] = False
+    rows[:64] = rows[-64:] = False
     simulated, findings = best.simulated, []
 
     def add(effect, std, before, after, evidence):
@@ -300,8 +294,7 @@ def _read_off(engine, best, found, fixed, sensor):
             (p.measured - simulated)[rows],
             (p.measured - np.clip(simulated, limits.lower, limits.upper))[rows],
             "; ".join(words for words in found.words if "limit" in words))
-    variance = best.cost / p.count
-    if found.step and found.step**2 / 12 > _COARSE * variance:
+    if _coarse(engine, best, found):
         coarse = found.step * np.round(simulated / found.step)
         free = rows & p.used
         add(known["quantization"](found.step), {"step": 1e-6 * found.step},
@@ -326,6 +319,11 @@ def _read_off(engine, best, found, fixed, sensor):
             (p.measured - simulated)[counted][late],
             next(words for words in found.words if "missing" in words))
     return findings
+
+
+def _coarse(engine, best, found):
+    """Whether the lattice of the values accounts for much of the residual."""
+    return bool(found.step) and found.step**2 / 12 > _COARSE * best.cost / engine.problem.count
 
 
 def _at_stamps(simulated, record, sensor):

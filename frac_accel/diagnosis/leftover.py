@@ -12,9 +12,10 @@ from .starts import bulk_shift
 _SEGMENTS = 48
 _SHIFTS = 40
 _ALIKE = 4
-_BLOCK = 32
-# Least spread of a correlation that chance is allowed.
-_STEADY = 0.02
+# Length of the stretches that count as loud or quiet, and the signal's power in the loudest of them
+# from which others are loud too.
+_BLOCK = 64
+_LOUD = 0.1
 # Share of the sensor's power that must follow the reference, and its score against chance.
 _SHARED = 0.05
 _RELATED = 8.0
@@ -83,7 +84,7 @@ def leftover(residual, simulated, used, across=()):
     linear, linear_score = max((_linear(residual, signal, rng) for signal in
                                 (simulated, *across)), key=lambda pair: pair[1])
     level, level_score = max(_level(residual, simulated, used, rng),
-                             _quiet(residual, simulated, used, rng), key=lambda pair: pair[0]
+                             _quiet(residual, simulated, used), key=lambda pair: pair[0]
                              * (pair[1] > _SIGNIFICANT))
     return Leftover(rms, linear, level, linear_score, level_score)
 
@@ -159,22 +160,23 @@ def _level(residual, simulated, used, rng):
     return max(found - np.mean(chance), 0.0), (found - np.mean(chance)) / max(np.std(chance), 1e-3)
 
 
-def _quiet(residual, simulated, used, rng):
+def _quiet(residual, simulated, used):
     """Share of the residual's power that is missing where the sensor is quiet."""
     steps = np.diff(simulated, append=simulated[-1:])
     swing = simulated - simulated[used].mean()
     signal = swing**2 / np.mean(swing**2) + steps**2 / max(np.mean(steps**2), 1e-300)
     count = len(residual) // _BLOCK
-    whole = [values[:count * _BLOCK].reshape(count, _BLOCK).sum(axis=1)
-             for values in (residual**2, signal, used.astype(float))]
-    power, signal, weight = (values[whole[2] > 0] for values in whole)
-    quiet = np.argsort(signal)[:max(len(signal) // 5, 4)]
-
-    def alike(power):
-        return np.corrcoef(power / weight, signal)[0, 1]
-    found, chance = alike(power), []
-    for _ in range(_SHIFTS):
-        move = int(rng.integers(len(power) // 10, max(9 * len(power) // 10, len(power) // 10 + 1)))
-        chance.append(alike(np.roll(power, move)))
+    power, signal, weight = (values[:count * _BLOCK].reshape(count, _BLOCK).sum(axis=1)
+                             for values in (residual**2, signal, used.astype(float)))
+    here = weight > _BLOCK // 2
+    power, signal, weight = power[here], signal[here], weight[here]
+    quiet = np.argsort(signal)[:len(signal) // 2]
+    loud = signal > _LOUD * signal.max()
+    loud[quiet] = False
+    if len(quiet) < 8 or not loud.any():
+        return 0.0, 0.0
+    level = np.log(power / weight + 1e-300)
+    spread = np.std(level[quiet]) * np.sqrt(1 / loud.sum() + 1 / len(quiet))
+    score = (level[loud].mean() - level[quiet].mean()) / max(spread, 1e-12)
     missing = 1 - (power[quiet].sum() / weight[quiet].sum()) / (power.sum() / weight.sum())
-    return max(missing, 0.0), (found - np.mean(chance)) / max(np.std(chance), _STEADY)
+    return max(missing, 0.0), score

@@ -9,7 +9,7 @@ from .starts import CAUSES, starts
 
 _BEAM = 3
 # Factors within which a finite change can be had by a nearby start.
-_REACH = (0.4, 1.5)
+_REACH = (0.6, 1.6)
 _FITS = 8
 _MOST = 4
 # Iterations of a first trial, and the cost over the best one's with which it ends there.
@@ -115,8 +115,10 @@ class Search:
         factor = shared / size
         if start.kind == "positive" and factor <= 0:
             return None
-        if start.kind == "finite":
-            factor = np.clip(factor, *_REACH)
+        if start.kind == "weak" and factor <= 0:
+            return None
+        if start.kind in ("finite", "weak"):
+            factor = np.clip(factor, _REACH[0] if start.kind == "finite" else 0.0, _REACH[1])
         cost = fitted.cost - 2 * factor * shared + factor**2 * size
         effect = start.effect
         if start.parameter:
@@ -124,7 +126,7 @@ class Search:
             effect = dataclasses.replace(effect, **{start.parameter: float(scaled)})
         return cost, cause, effect
 
-    def run(self, threshold, done, seed=None):
+    def run(self, threshold, done, seed=None, most=_MOST):
         """Grow sets of causes until nothing is gained; the best set of each size.
 
         Parameters
@@ -135,12 +137,14 @@ class Search:
             True for a fit that leaves nothing but noise.
         seed : dict of str to Effect, optional
             Causes to begin with, besides none.
+        most : int
+            Largest number of causes to be added.
         """
         beam = [self.fit(self.base)]
         if seed:
             beam = sorted([*beam, self.fit({**self.base, **seed})], key=lambda fit: fit.cost)
         best = beam[0]
-        for _ in range(_MOST):
+        for _ in range(most):
             wanted = {}
             least = best.cost - threshold(best) if done(best) else np.inf
             for parent in beam:

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.ndimage import uniform_filter1d
 
 from ..effects import known_effects
 
@@ -18,7 +19,8 @@ class Start(NamedTuple):
         Changes that are screened together, as if the output were linear in them.
     kind : str
         ``free``: the output is nearly linear in `parameter`, of either sign; ``positive``: the
-        same, but it cannot be negative; ``finite``: the effect counts as it is.
+        same, but it cannot be negative; ``finite``: the effect counts as it is; ``weak``: as it is
+        or weaker.
     parameter : str or None
         What a screened factor scales.
     """
@@ -46,6 +48,12 @@ def _finite(effect):
     return Start(effect, (effect,), "finite")
 
 
+def _grid(effects):
+    """Starts over a grid whose last effect is the weakest."""
+    *stronger, weakest = effects
+    return [*map(_finite, stronger), Start(weakest, (weakest,), "weak")]
+
+
 def _core_shift(cls, view):
     core = view.core
     f, z = core.natural_frequency_hz, core.damping_ratio
@@ -64,8 +72,27 @@ def _fractional(cls, view):
 
 
 def _mounting(cls, view):
-    return [_finite(cls(f, z)) for f in view.rate * np.geomspace(0.02, 1.0, 10)
-            for z in (0.07, 0.2, 0.6)]
+    grid = view.rate * np.geomspace(0.02, 3.0, 18)
+    # one that rings shows in the residual, between the points of any grid
+    peaks = _peaks(view)
+    return [start for z in (0.07, 0.2, 0.6) for start in _grid([cls(f, z) for f in grid])] \
+        + [_finite(cls(f, z)) for f in peaks for z in (0.02, 0.06)]
+
+
+def _peaks(view, count=3):
+    """Frequencies [Hz] of the highest peaks of the residual's smoothed spectrum."""
+    power = np.abs(rfft(view.residual))**2
+    width = max(3, len(power) // 400)
+    smooth = uniform_filter1d(power, width)
+    inner = smooth[1:-1]
+    tops = 1 + np.flatnonzero((inner > smooth[:-2]) & (inner >= smooth[2:]))
+    found = []
+    for top in tops[np.argsort(smooth[tops])[::-1]]:
+        if top > 2 * width and all(abs(top - other) > 2 * width for other in found):
+            found.append(top)
+        if len(found) == count:
+            break
+    return [top * view.rate / len(view.residual) for top in found]
 
 
 def _delay(cls, view):
@@ -123,10 +150,10 @@ _STARTS = {
     "time_delay": _delay,
     "clock_skew": lambda cls, view: [_free(cls(1.0), "skew_ppm"), _finite(cls(100.0)),
                                      _finite(cls(-100.0))],
-    "ac_coupling": lambda cls, view: [
-        _finite(cls(f)) for f in view.rate * np.geomspace(2e-5, 5e-2, 8)],
-    "low_pass_lag": lambda cls, view: [
-        _finite(cls(f)) for f in view.rate * np.geomspace(0.02, 5, 8)],
+    "ac_coupling": lambda cls, view: _grid(
+        [cls(f) for f in view.rate * np.geomspace(5e-2, 2e-6, 18)]),
+    "low_pass_lag": lambda cls, view: _grid(
+        [cls(f) for f in view.rate * np.geomspace(0.02, 20, 13)]),
     "mounting_resonance": _mounting,
     "fractional_damping": _fractional,
     "cross_axis_sensitivity": _cross,
