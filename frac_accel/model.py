@@ -2,6 +2,7 @@
 
 import dataclasses
 import difflib
+import functools
 
 import numpy as np
 import yaml
@@ -9,7 +10,7 @@ import yaml
 from .atomic_file import write_text
 from .core import CORES, Arx
 from .core.static_force import StaticForce
-from .effects import Effect, known_effects
+from .effects import Circumstances, Effect, known_effects
 from .errors import ModelError
 from .parameters import as_mapping, build, number, parameter_fields, plain
 
@@ -59,6 +60,18 @@ class AxisModel:
     def clock_ratio(self):
         """Time that passes while the stamps advance by one second."""
         return float(np.prod([effect.clock_ratio() for effect in self.effects]))
+
+    @property
+    def limits(self):
+        """Lowest and highest value that can come out."""
+        low, high = -np.inf, np.inf
+        for effect in self.effects:
+            if np.isfinite([low, high]).any():
+                # what stands behind the limits, such as a rounding, moves them
+                low, high = effect.simulate(np.array([low, high]), Circumstances.at_rest(2))
+            lower, upper = effect.limits()
+            low, high = max(low, lower), min(high, upper)
+        return low, high
 
     @property
     def dynamics(self):
@@ -124,6 +137,11 @@ class SensorModel:
         """AxisModel of ``"x"``, ``"y"``, ``"z"`` or 0, 1, 2."""
         return self.axes[AXES.index(axis) if isinstance(axis, str) else axis]
 
+    @functools.cached_property
+    def needs_temperature(self):
+        """Whether an effect of some axis depends on the temperature."""
+        return any(effect.needs_temperature for axis in self.axes for effect in axis.effects)
+
     @property
     def noise_std(self):
         """Standard deviation of the sensor's white noise [output units]; 0 where not known."""
@@ -168,11 +186,40 @@ class SensorModel:
             values = effect.simulate_axes(values, by_axis, circumstances)
         return values
 
-    def remove_sample_effects(self, values, circumstances):
-        """Inverse of `apply_sample_effects`."""
-        for effect, by_axis in reversed(self._stages):
-            values = effect.invert_axes(values, by_axis, circumstances)
-        return values
+    def remove_sample_effects(self, values, circumstances, variance=None):
+        """Inverse of `apply_sample_effects`.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n, 3)
+        circumstances : Circumstances
+        variance : ndarray, shape (n, 3), optional
+            Variance of the samples' noise; default 0.
+
+        Returns
+        -------
+        values, variance : ndarray, shape (n, 3)
+        """
+        if variance is None:
+            variance = np.zeros_like(values)
+        return _removed(self._stages, values, variance, circumstances)
+
+    def live_inverse(self, sampling_rate_hz):
+        """`remove_sample_effects` for consecutive blocks of one stream at a rate [Hz].
+
+        Returns
+        -------
+        callable
+            (values, variance, circumstances) -> (values, variance).
+        """
+        stages = [(cause, {axis: effect.live(sampling_rate_hz) for axis, effect in by_axis.items()})
+                  for cause, by_axis in self._stages]
+        return functools.partial(_removed, stages)
+
+    @functools.cached_property
+    def limits(self):
+        """Lowest and highest value that each axis can say, shape (3,) each."""
+        return tuple(np.array([axis.limits for axis in self.axes]).T)
 
     @classmethod
     def from_dict(cls, data, where=""):
@@ -271,6 +318,12 @@ class SensorModel:
             write_text(path, text)
         except OSError as error:
             raise ModelError(f"{path}: cannot write the model: {error.strerror}") from None
+
+
+def _removed(stages, values, variance, circumstances):
+    for cause, by_axis in reversed(stages):
+        values, variance = cause.invert_axes(values, variance, by_axis, circumstances)
+    return values, variance
 
 
 def _sample_stages(axes):

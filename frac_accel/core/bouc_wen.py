@@ -1,4 +1,4 @@
-r"""Bouc-Wen variable of a hysteretic spring, compiled.
+r"""Bouc-Wen variable of a hysteretic spring.
 
 :math:`z' = q' - \beta |q'| z - \gamma q' |z|` does not depend on how fast q moves: while q goes one
 way (sign s) and z keeps its sign,
@@ -10,42 +10,27 @@ has the solution :math:`z + (1 - k z)(1 - e^{-k \Delta q}) / k`.
 
 import math
 
-import numba
 
+def follow_one_way(z, change, beta, gamma):
+    """Variable after q has gone by `change` without turning.
 
-@numba.njit(cache=True, error_model="numpy")
-def follow(z, q0, v0, q1, v1, duration, beta, gamma):
-    """Variable after q has gone from q0 to q1, with velocities v0 and v1 at the ends.
-
-    If the velocity turns on the way, it is taken as linear in time.
+    Plain enough to be compiled by numba as it stands.
     """
-    if v0 * v1 < 0:
-        turn = q0 + 0.5 * duration * v0 * v0 / (v0 - v1)
-        return _one_way(_one_way(z, turn - q0, beta, gamma), q1 - turn, beta, gamma)
-    return _one_way(z, q1 - q0, beta, gamma)
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _one_way(z, change, beta, gamma):
-    if change == 0.0:
-        return z
     way = beta if change > 0 else -beta
-    if z * change < 0:  # on the way to zero
-        k = way + (gamma if z > 0 else -gamma)
-        end = z + (1 - k * z) * _saturation(k, change)
-        if end * z > 0:
+    for _ in range(2):  # up to z = 0, and on from there
+        if change == 0.0:
+            break
+        side = z if z != 0.0 else change
+        k = way + (gamma if side > 0 else -gamma)
+        x = -k * change
+        if abs(x) > 0.05:
+            saturation = -math.expm1(x) / k
+        else:  # its series, far faster
+            saturation = change * (
+                1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6)))))
+        end = z + (1 - k * z) * saturation
+        if z * change >= 0 or end * z > 0:
             return end
         change -= math.log1p(-k * z) / k if k != 0 else -z
         z = 0.0
-    k = way + (gamma if change > 0 else -gamma)
-    return z + (1 - k * z) * _saturation(k, change)
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _saturation(k, change):
-    """(1 - exp(-k change)) / k."""
-    x = -k * change
-    if abs(x) > 0.05:
-        return -math.expm1(x) / k
-    # the series, far faster than the function
-    return change * (1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6)))))
+    return z

@@ -19,7 +19,7 @@ This module needs numba; it is imported when a nonlinear model is simulated.
 import numba
 import numpy as np
 
-from .bouc_wen import follow
+from .bouc_wen import follow_one_way
 
 _PASSES = 40
 _CONVERGED = 1e-7      # of the force
@@ -31,6 +31,8 @@ _TURNED = 1e-5          # of a step, the permitted error of a turn
 _fast = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 _exact = numba.njit(cache=True, error_model="numpy")
 _inlined = numba.njit(cache=True, error_model="numpy", inline="always")
+
+_follow_one_way = _exact(follow_one_way)
 
 
 def deviation(modes, force, step, motion, start):
@@ -196,6 +198,19 @@ def _power_terms(terms, q):
     return total * q
 
 
+@_exact
+def _follow(z, q0, v0, q1, v1, duration, beta, gamma):
+    """Bouc-Wen variable after q has gone from q0 to q1 with the velocities v0 and v1 at the ends.
+
+    If the velocity turns on the way, it is taken as linear in time.
+    """
+    if v0 * v1 < 0:
+        turn = q0 + 0.5 * duration * v0 * v0 / (v0 - v1)
+        z = _follow_one_way(z, turn - q0, beta, gamma)
+        return _follow_one_way(z, q1 - turn, beta, gamma)
+    return _follow_one_way(z, q1 - q0, beta, gamma)
+
+
 @_inlined
 def _motion(free, sums, i, order, p0, p1, p2):
     """Derivative of the output in the middle (i = 0) or at the end (1) of a step."""
@@ -219,8 +234,8 @@ def _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameter
         if strength != 0:
             vm = _motion(free, sums, 0, 1, p0, p1, p2)
             ve = _motion(free, sums, 1, 1, p0, p1, p2)
-            zm = follow(z0, q0, v0, qm, vm, length / 2, beta, gamma)
-            ze = follow(zm, qm, vm, qe, ve, length / 2, beta, gamma)
+            zm = _follow(z0, q0, v0, qm, vm, length / 2, beta, gamma)
+            ze = _follow(zm, qm, vm, qe, ve, length / 2, beta, gamma)
         newm = _power_terms(terms, qm) + strength * zm + friction
         newe = _power_terms(terms, qe) + strength * ze + friction
         change = abs(newm - nm) + abs(newe - ne)

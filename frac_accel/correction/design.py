@@ -10,6 +10,7 @@ from ..effects import Circumstances
 from ..errors import DesignError, FracAccelError
 from ..model import AXES
 from .fitting import LOWEST_SHARE, FilterProblem, evaluate
+from .static_terms import StaticTermsDesign
 
 # A band ends where the sensor's gain has fallen to this share of its reference gain: the inverse
 # multiplies the noise there by five. At the latest it ends at 0.6 of the Nyquist frequency.
@@ -33,6 +34,8 @@ class FilterDesign:
     sampling_rate_hz : float
     axes : tuple of DesignedFilter
         One for each of x, y, z.
+    static_terms : tuple of StaticTerms
+        What the nonlinear spring of each axis adds; None where it is linear.
     delay_samples : int
         An output belongs to the sample this many before the newest.
     sensor_delay_ns : int
@@ -42,13 +45,15 @@ class FilterDesign:
     model: object
     sampling_rate_hz: float
     axes: tuple
+    static_terms: tuple
     delay_samples: int
     sensor_delay_ns: int
 
     @property
     def warm_up_samples(self):
         """Number of samples after a start that cannot be estimated: the taps are not yet full."""
-        return max(axis.filter.lead + len(axis.filter.taps) for axis in self.axes) - 1
+        linear = max(axis.filter.lead + len(axis.filter.taps) for axis in self.axes) - 1
+        return max(linear, *(terms.warm_up_samples for terms in self.static_terms if terms), 0)
 
     def summary(self):
         """Plain numbers of the design, for reports and diagnostics."""
@@ -117,23 +122,49 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
         if value is not None:
             _positive(value, name)
     model.remove_sample_effects(np.zeros((1, 3)), Circumstances.at_rest(1))  # refuses singular ones
-    _require_live(model)
+    ratio = _clock_ratio(model)
     bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz, model.band_hz)
              for name, axis in zip(AXES, model.axes)]
     # stamps are whole nanoseconds; what is left of the delay is done by the filters
     sensor_delay_ns = int(np.ceil(max(axis.delay_s for axis in model.axes) * 1e9 - 1e-3))
 
+    # what the sensor's clock calls a second is `ratio` seconds
+    true_rate = rate / ratio
+
+    def late(axis):
+        return max(0.0, sensor_delay_ns * 1e-9 - axis.delay_s) * true_rate
+
     @functools.cache
     def problem(axis, band):
-        return FilterProblem(lambda s: 1 / axis.transfer_function(s), axis.zeros(), rate, band,
-                        max(0.0, sensor_delay_ns * 1e-9 - axis.delay_s) * rate)
+        return FilterProblem(lambda s: 1 / axis.transfer_function(s), axis.zeros(), true_rate, band,
+                             late(axis))
+
+    @functools.cache
+    def terms(axis, band):
+        return StaticTermsDesign(axis, true_rate, band, late(axis)) if axis.static_force else None
 
     problems = [problem(axis, band) for axis, band in zip(model.axes, bands)]
+    nonlinear = [terms(axis, band) for axis, band in zip(model.axes, bands)]
     delay = _choose_delay(list(dict.fromkeys(problems)), rate, max_delay_s, tolerance)
-    return FilterDesign(
-        model=model, sampling_rate_hz=rate,
-        axes=tuple(p.solve(delay, tolerance) for p in problems),
-        delay_samples=delay, sensor_delay_ns=sensor_delay_ns)
+    delay = _delay_with_terms(delay, nonlinear, rate, max_delay_s)
+
+    @functools.cache
+    def solved(own_problem, own_terms):
+        linear = own_problem.solve(delay, tolerance)
+        return linear, own_terms.solve(delay, linear) if own_terms else None
+
+    axes, static_terms = zip(*map(solved, problems, nonlinear))
+    return FilterDesign(model=model, sampling_rate_hz=rate, axes=axes, static_terms=static_terms,
+                        delay_samples=delay, sensor_delay_ns=sensor_delay_ns)
+
+
+def _delay_with_terms(delay, nonlinear, rate, max_delay_s):
+    """Delay [samples] that is long enough for the path of the nonlinear terms, too."""
+    least = max((terms.least_delay for terms in nonlinear if terms), default=0)
+    if max_delay_s is not None and least > max_delay_s * rate * (1 + 1e-9):
+        raise DesignError(f"the nonlinear terms need a delay of {_rounded_up(least / rate, 6)} s, "
+                          f"but max_delay_s is {max_delay_s:.3g} s")
+    return max(delay, least)
 
 
 def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
@@ -158,7 +189,10 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
         If the tolerance cannot be met.
     """
     rate = _positive(sampling_rate_hz, "sampling_rate_hz")
-    _require_live(model)
+    _clock_ratio(model)
+    if any(axis.static_force for axis in model.axes):
+        raise DesignError("a model with a nonlinear spring or friction cannot be played live; "
+                          "simulate it offline")
     # a sensor whose stamps are early (a negative delay) can only be played so much later
     wait = int(np.ceil(max(0.0, *(-axis.delay_s * rate for axis in model.axes))))
 
@@ -172,16 +206,16 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
     delay = _choose_delay(list(dict.fromkeys(problems)), rate, None, tolerance)
     return FilterDesign(model=model, sampling_rate_hz=rate,
                         axes=tuple(p.solve(delay, tolerance) for p in problems),
-                        delay_samples=delay + wait, sensor_delay_ns=0)
+                        static_terms=(None,) * 3, delay_samples=delay + wait, sensor_delay_ns=0)
 
 
-def _require_live(model):
-    """Raise DesignError where an effect is not yet done live."""
-    for axis in model.axes:
-        for effect in axis.effects:
-            if axis.static_force or effect.cause in (
-                    "clock_skew", "gain_drift", "tone_interference", "temperature_sensitivity"):
-                raise DesignError(f"effects: {effect.cause} cannot be done live yet")
+def _clock_ratio(model):
+    """Ratio of the sensor's clock, which is one for all axes."""
+    ratios = {axis.clock_ratio for axis in model.axes}
+    if len(ratios) > 1:
+        raise DesignError("effects: clock_skew differs between the axes, but a sample has one "
+                          "stamp for all of them")
+    return ratios.pop()
 
 
 def _choose_delay(problems, rate, max_delay_s, tolerance):

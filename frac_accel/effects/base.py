@@ -7,7 +7,8 @@ An effect acts in one of these ways, and overrides what it needs:
 * as a linear time-invariant link (`transfer_function`, `pure_delay_s`), e.g. a low-pass: all
   links of an axis and its core form one composite response, simulated and inverted as one filter;
 * on the sensor's clock (`clock_ratio`);
-* on the samples after all that (`simulate`, `invert`), e.g. an offset.
+* on the samples after all that (`simulate`, `invert`), e.g. an offset; where the inverse depends
+  on the samples before, `live` gives an object that remembers them.
 """
 
 from typing import ClassVar, NamedTuple
@@ -30,7 +31,7 @@ class Circumstances(NamedTuple):
     time_s : ndarray, shape (n,)
         Time [s] since the record's start.
     temperature_c : ndarray, shape (n,), or None
-        Temperature [°C]; None where it is not known.
+        Temperature [°C]; None or NaN where it is not known.
     """
 
     time_s: np.ndarray
@@ -49,6 +50,7 @@ class Effect:
     cause: ClassVar[str]
     stage: ClassVar[int]
     explanation: ClassVar[str]
+    needs_temperature: ClassVar[bool] = False
 
     def pure_delay_s(self):
         """Time [s] by which this effect moves the signal as it is."""
@@ -69,6 +71,10 @@ class Effect:
     def transfer_function(self, s):
         """Linear link's transfer function at complex `s` [rad/s], without its pure delay."""
         return np.ones_like(s, dtype=complex)
+
+    def limits(self):
+        """Lowest and highest value that can come out."""
+        return -np.inf, np.inf
 
     def reference_gain(self):
         """Gain of the link on its plateau."""
@@ -97,9 +103,24 @@ class Effect:
         """
         return values
 
-    def invert(self, values, circumstances):
-        """Samples before this effect, from those after it; the inverse of `simulate`."""
-        return values
+    def invert(self, values, variance, circumstances):
+        """Samples before this effect and their variance; the inverse of `simulate`.
+
+        Parameters
+        ----------
+        values, variance : ndarray, shape (n,)
+            Samples after it, and the variance of their noise (0 where it is not known).
+        circumstances : Circumstances
+
+        Returns
+        -------
+        values, variance : ndarray, shape (n,)
+        """
+        return values, variance
+
+    def live(self, sampling_rate_hz):
+        """Object whose `invert` takes consecutive blocks of a stream at that rate."""
+        return self
 
     @classmethod
     def simulate_axes(cls, values, by_axis, circumstances):
@@ -123,12 +144,13 @@ class Effect:
         return result
 
     @classmethod
-    def invert_axes(cls, values, by_axis, circumstances):
-        """Samples of all axes before this cause; the inverse of `simulate_axes`."""
-        result = values.copy()
+    def invert_axes(cls, values, variance, by_axis, circumstances):
+        """Samples of all axes before this cause and their variance, both (n, 3)."""
+        values, variance = values.copy(), variance.copy()
         for axis, effect in by_axis.items():
-            result[:, axis] = effect.invert(values[:, axis], circumstances)
-        return result
+            values[:, axis], variance[:, axis] = effect.invert(
+                values[:, axis], variance[:, axis], circumstances)
+        return values, variance
 
 
 def require_oscillator(core, cause):

@@ -27,3 +27,6 @@ class Clipping(Effect):
 
     def simulate(self, values, circumstances):
         return np.clip(values, self.lower, self.upper)
+
+    def limits(self):
+        return self.lower, self.upper

@@ -36,8 +36,9 @@ class CrossAxisSensitivity(Effect):
         return _mix(values, cls.matrix(by_axis))
 
     @classmethod
-    def invert_axes(cls, values, by_axis, circumstances):
-        return _mix(values, _inverse(tuple(by_axis.items())))
+    def invert_axes(cls, values, variance, by_axis, circumstances):
+        inverse = _inverse(tuple(by_axis.items()))
+        return _mix(values, inverse), _mix(variance, inverse**2)
 
 
 @functools.lru_cache

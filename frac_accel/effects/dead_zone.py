@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from scipy.special import erf
 
 from ..parameters import parameter
 from .base import DEAD_ZONE, Effect
@@ -21,6 +22,10 @@ class DeadZone(Effect):
     def simulate(self, values, circumstances):
         return values - np.clip(values, -self.half_width, self.half_width)
 
-    def invert(self, values, circumstances):
-        """Inside the zone, its middle."""
-        return values + np.sign(values) * self.half_width
+    def invert(self, values, variance, circumstances):
+        """Inside the zone, where only noise is seen, its middle with the zone's variance."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sign = erf(values / np.sqrt(2 * variance))  # mean of the sign behind the noise
+        sign = np.where(variance > 0, sign, np.sign(values))
+        doubt = self.half_width**2 / 3 * (1 - sign**2)
+        return values + sign * self.half_width, variance + doubt

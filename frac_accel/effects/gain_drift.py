@@ -2,8 +2,12 @@
 
 import dataclasses
 
+import numpy as np
+
 from ..parameters import parameter
 from .base import GAIN, Effect
+
+_LEAST = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -17,7 +21,13 @@ class GainDrift(Effect):
     rate_per_s: float = parameter("1/s")
 
     def simulate(self, values, circumstances):
-        return values * (1 + self.rate_per_s * circumstances.time_s)
+        return values * self._gain(circumstances)
 
-    def invert(self, values, circumstances):
-        return values / (1 + self.rate_per_s * circumstances.time_s)
+    def invert(self, values, variance, circumstances):
+        gain = self._gain(circumstances)
+        # a line that has reached zero says nothing any more
+        gain = np.where(np.abs(gain) < _LEAST, np.copysign(_LEAST, gain), gain)
+        return values / gain, variance / gain**2
+
+    def _gain(self, circumstances):
+        return 1 + self.rate_per_s * circumstances.time_s

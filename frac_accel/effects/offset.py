@@ -19,5 +19,5 @@ class Offset(Effect):
     def simulate(self, values, circumstances):
         return values + self.offset
 
-    def invert(self, values, circumstances):
-        return values - self.offset
+    def invert(self, values, variance, circumstances):
+        return values - self.offset, variance

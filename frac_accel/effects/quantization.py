@@ -20,3 +20,7 @@ class Quantization(Effect):
 
     def simulate(self, values, circumstances):
         return self.step * np.round(values / self.step)
+
+    def invert(self, values, variance, circumstances):
+        """The values as they are, with the variance of a uniform error of one step's width."""
+        return values, variance + self.step**2 / 12
