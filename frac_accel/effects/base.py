@@ -49,6 +49,8 @@ class Effect:
     cause: ClassVar[str]
     stage: ClassVar[int]
     explanation: ClassVar[str]
+    # what separates this cause from its rivals where a record cannot
+    experiment: ClassVar[str] = "Repeat with a wider band, and at half and at twice the level."
 
     def pure_delay_s(self):
         """Time [s] by which this effect moves the signal as it is."""
