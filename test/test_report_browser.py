@@ -92,6 +92,16 @@ def test_report_of_an_identification_is_drawn(tmp_path):
     assert len(require_drawn(dom)) >= 5
 
 
+def test_report_of_a_diagnosis_is_drawn(tmp_path):
+    bag = browser.ROOT / "bags" / "soft_mount.mcap"
+    page = tmp_path / "r.html"
+    assert main(["diagnose", str(bag), "--model", str(bag.with_suffix(".yaml")), "--report",
+                 str(page)]) == 0
+    dom, console = browser.open_page(page)
+    assert not console
+    assert len(require_drawn(dom)) == 5
+
+
 def test_a_broken_page_is_noticed(tmp_path):
     """What the tests above rely on: errors and refused loads reach the console."""
     page = Page("Title")

@@ -8,11 +8,13 @@ from ..model import SensorModel
 from ._common import (
     add_bag,
     add_json,
+    add_report,
     add_topics,
     open_bag,
     progress,
     provenance,
     require_output,
+    require_report,
     step,
     write_json,
 )
@@ -28,15 +30,16 @@ def add_arguments(parser):
                         help="topic of the temperature, where there is one (default: %(default)s)")
     parser.add_argument("--extended-model", metavar="E.yaml",
                         help="write the model with what was found")
-    parser.add_argument("--report", metavar="R.html", help="write a page with plots")
+    add_report(parser)
     add_json(parser)
 
 
 def run(arguments):
     """Do it."""
-    for output in (arguments.extended_model, arguments.report):
-        if output:
-            require_output(output, arguments.bag, *filter(None, [arguments.model]))
+    inputs = [arguments.bag, *filter(None, [arguments.model])]
+    if arguments.extended_model:
+        require_output(arguments.extended_model, *inputs)
+    require_report(arguments.report, *inputs)
     model = SensorModel.load(arguments.model) if arguments.model else None
     reader = open_bag(arguments.bag)
     temperature = None
@@ -69,6 +72,8 @@ def table(found, axis):
     lines += [f"data: {words}" for words in found.integrity.words]
     if found.verdict == "insufficient_data":
         return "\n".join(lines)
+    if found.engine.problem.record.temperature_c is None:
+        lines.append("data: no temperature was recorded: what depends on it cannot be found")
     lines.append(f"the model in use leaves {found.baseline['rmse']:.4g} "
                  f"({found.baseline['nrmse']:.3%} of the output) on held-out data; noise "
                  f"{found.baseline['noise_rms']:.4g}")
@@ -79,7 +84,7 @@ def table(found, axis):
                          f"{entry['unit']}")
         lines += [f"  {words}" for words in finding.evidence]
     for suspect in found.suspects:
-        lines.append(f"not told apart: {' or '.join(suspect['causes'])}: {suspect['experiment']}")
+        lines += [f"suspected: {' or '.join(suspect['causes'])}", f"  {suspect['experiment']}"]
     if found.findings:
         lines.append(f"the extended model leaves {found.extended['rmse']:.4g} "
                      f"({found.extended['nrmse']:.3%}); {found.unexplained_fraction:.1%} of the "

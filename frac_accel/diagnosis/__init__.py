@@ -8,6 +8,7 @@ from ..bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
 from ..core import Oscillator
 from ..effects import known_effects
 from ..errors import FracAccelError, IdentificationError
+from ..identification.excitation import learning_length
 from ..model import AXES, SensorModel
 from ..pair import Pair
 from . import integrity
@@ -63,6 +64,12 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
         return insufficient(f"the record has {len(record)} samples, expected at least {_FEWEST}",
                             model, found)
     fixed, used = _limits(found, record, column)
+    split = learning_length(record.reference[:, column])
+    for rows, part in ((used[:split], "before"), (used[split:], "after")):
+        if rows.sum() < _FEWEST // 4:
+            return insufficient(f"{rows.sum()} samples count {part} the instant that parts "
+                                f"learning from judging, expected at least {_FEWEST // 4}",
+                                model, found)
     seed = None
     if model is None:
         progress("identifying a classical model")

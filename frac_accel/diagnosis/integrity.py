@@ -72,7 +72,10 @@ def check(sensor, sampling_rate_hz, column):
     slope, start = np.polyfit(slot, seconds, 1)
     scatter = seconds - (slope * slot + start)
     jitter = float(np.std(scatter))
-    missing = int(slot[-1] - slot[0] + 1 - len(np.unique(slot)))
+    # a message whose value is no number has come all the same
+    useless = np.round((sensor.stamps_ns[~finite] - stamps[0]) * 1e-9 * sampling_rate_hz)
+    useless = useless[(useless > slot[0]) & (useless < slot[-1])]
+    missing = int(slot[-1] - slot[0] + 1 - len(np.union1d(slot, useless)))
     axis = values[:, column]
     step = lattice(axis)
     lower, upper = pile_up(-axis, step), pile_up(axis, step)

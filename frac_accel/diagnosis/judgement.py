@@ -10,6 +10,7 @@ from ..effects import known_effects
 from ..model import AXES, AxisModel, SensorModel
 from ..pair import clean
 from ..parameters import parameter_fields
+from .experiments import separating_experiment
 from .gain import gain
 
 # Share of the baseline's excess power that may be left where causes are named.
@@ -79,7 +80,8 @@ class Diagnosis:
         ``rmse``, ``nrmse`` on held-out data, ``noise_rms`` [output units].
     findings : list of Finding
     suspects : list of dict
-        Sets of causes that the data cannot tell apart.
+        ``causes`` that the data cannot tell apart, their ``margin`` in variances of the noise, and
+        the ``experiment`` that would.
     unexplained_fraction : float
         What remains above the noise, over the baseline's excess above it (in power).
     model : SensorModel
@@ -176,10 +178,15 @@ def judge(engine, best, found, fixed, loose, sensor):
         if margin > _CLEAR:
             findings.append(entry)
         else:
-            suspects.append({"causes": sorted({cause, *instead}), "margin": float(margin)})
+            suspects.append(_suspect({cause, *instead}, margin))
     findings += _moved(engine, best, loose, stds)
     findings += _read_off(engine, best, found, fixed, sensor)
     return _verdict(engine, best, left, findings, suspects, found)
+
+
+def _suspect(causes, margin):
+    return {"causes": sorted(causes), "margin": float(margin),
+            "experiment": separating_experiment(causes)}
 
 
 def _verdict(engine, best, left, findings, suspects, found):
@@ -197,8 +204,7 @@ def _verdict(engine, best, left, findings, suspects, found):
     fraction = remains / excess if left.share > 0 and excess > 0 else 0.0
     if fraction > _LEFT:
         # what is left could have been mistaken for any of the causes
-        suspects += [{"causes": [f.cause], "margin": 0.0} for f in findings
-                     if f.cause in best.effects]
+        suspects += [_suspect({f.cause}, 0.0) for f in findings if f.cause in best.effects]
         findings = [f for f in findings if f.cause not in best.effects]
     named = {f.cause for f in findings}
     complete = {c for c in best.effects if c not in engine.search.base} <= named

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from ..errors import FracAccelError
 from ..pair import make_pair
 
 
@@ -39,13 +40,31 @@ class Record:
 
     @classmethod
     def of(cls, reference, sensor, axis="x", temperature=None):
-        """Record of two runs of samples, and (stamps_ns, celsius) where known."""
+        """Record of two runs of samples, and (stamps_ns, celsius) where known.
+
+        It ends with the last sample of the sensor.
+
+        Raises
+        ------
+        FracAccelError
+            If no pair can be made of the samples, or no temperature is finite.
+        """
         pair = make_pair(reference, sensor, axis)
         celsius = None
         if temperature is not None:
-            stamps, values = temperature
-            instants = pair.start_ns + np.arange(len(pair)) * 1e9 / pair.sampling_rate_hz
-            celsius = np.interp(instants - pair.start_ns,
-                                np.asarray(stamps, float) - pair.start_ns, values)
-        return cls(pair.sampling_rate_hz, pair.reference, pair.sensor, pair.valid, pair.lag_s,
-                   celsius, pair.start_ns)
+            instants = np.arange(len(pair)) * 1e9 / pair.sampling_rate_hz
+            celsius = _interpolated(instants, pair.start_ns, *temperature)
+        whole = cls(pair.sampling_rate_hz, pair.reference, pair.sensor, pair.valid, pair.lag_s,
+                    celsius, pair.start_ns)
+        return whole.part(slice(0, int(np.flatnonzero(pair.valid)[-1]) + 1))
+
+
+def _interpolated(instants_ns, start_ns, stamps_ns, celsius):
+    """Temperature at instants after a start, held before its first and after its last value."""
+    stamps_ns, celsius = np.asarray(stamps_ns, np.int64), np.asarray(celsius, float)
+    good = np.isfinite(celsius)
+    if not good.any():
+        raise FracAccelError(f"temperature: none of {len(celsius)} values is finite")
+    stamps_ns, celsius = stamps_ns[good], celsius[good]
+    order = np.argsort(stamps_ns, kind="stable")
+    return np.interp(instants_ns, (stamps_ns[order] - start_ns).astype(float), celsius[order])

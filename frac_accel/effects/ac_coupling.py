@@ -15,6 +15,8 @@ class AcCoupling(Effect):
     cause = "ac_coupling"
     stage = CONDITIONER
     explanation = "The conditioner is coupled through a high-pass, so slow motion is lost."
+    experiment = ("Hold a constant acceleration, such as gravity after turning the sensor over: "
+                  "behind a high-pass the output returns to zero.")
 
     corner_hz: float = parameter("Hz", above=0)
 

@@ -51,6 +51,8 @@ class Effect:
     stage: ClassVar[int]
     explanation: ClassVar[str]
     needs_temperature: ClassVar[bool] = False
+    # what separates this cause from its rivals where a record cannot
+    experiment: ClassVar[str] = "Repeat with a wider band, and at half and at twice the level."
 
     def pure_delay_s(self):
         """Time [s] by which this effect moves the signal as it is."""

@@ -16,6 +16,7 @@ class Clipping(Effect):
     cause = "clipping"
     stage = CLIPPING
     explanation = "Values beyond the sensor's range are cut off."
+    experiment = "Repeat at half the level: nothing is cut then, and the output follows again."
 
     lower: float = parameter("output units")
     upper: float = parameter("output units")

@@ -13,6 +13,8 @@ class ClockSkew(Effect):
     cause = "clock_skew"
     stage = DELAY
     explanation = "The sensor's clock runs at another rate than the reference's."
+    experiment = ("Record longer, with a sharp event at the beginning and at the end: a skew lets "
+                  "the lag grow from one to the other.")
 
     # no crystal is off by more than this
     skew_ppm: float = parameter("1e-6", minimum=-10_000, maximum=10_000)

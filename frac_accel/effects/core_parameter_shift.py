@@ -13,6 +13,8 @@ class CoreParameterShift(Effect):
     cause = "core_parameter_shift"
     stage = CORE
     explanation = "The sensor's natural frequency and damping are no longer those of the model."
+    experiment = ("Sweep across the resonance: place and width of the peak give frequency and "
+                  "damping by themselves.")
 
     natural_frequency_hz: float = parameter("Hz", above=0, maximum=1e8)
     damping_ratio: float = parameter("1", above=0, maximum=100)

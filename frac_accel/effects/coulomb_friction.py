@@ -13,6 +13,8 @@ class CoulombFriction(Effect):
     cause = "coulomb_friction"
     stage = CORE
     explanation = "Dry friction holds the seismic mass until the force on it exceeds a level."
+    experiment = ("Repeat at a tenth of the level: friction does not shrink with the motion, and "
+                  "in the end holds the mass altogether.")
 
     level: float = parameter("output units", minimum=0)
 

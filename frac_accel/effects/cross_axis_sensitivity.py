@@ -17,6 +17,8 @@ class CrossAxisSensitivity(Effect):
     cause = "cross_axis_sensitivity"
     stage = CROSS_AXIS
     explanation = "The sensor also answers to motion across its axis."
+    experiment = ("Move in one direction across the axis at a time, with the axis itself at rest: "
+                  "what it still shows came across.")
 
     x: float = parameter("1", minimum=-1, maximum=1, default=0.0)
     y: float = parameter("1", minimum=-1, maximum=1, default=0.0)

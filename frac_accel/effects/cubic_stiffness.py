@@ -13,6 +13,8 @@ class CubicStiffness(Effect):
     cause = "cubic_stiffness"
     stage = CORE
     explanation = "The spring hardens (or softens) at large displacement, the same both ways."
+    experiment = ("Repeat at half and at twice the level: the deviation grows with the cube of "
+                  "the level.")
 
     alpha3: float = parameter("1/(output units)^2")
 

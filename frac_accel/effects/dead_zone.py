@@ -16,6 +16,8 @@ class DeadZone(Effect):
     cause = "dead_zone"
     stage = DEAD_ZONE
     explanation = "Small signals give no output, and larger ones lose the same amount."
+    experiment = ("Repeat at a tenth of the level: a dead zone takes the same amount from every "
+                  "swing, and all of a small one.")
 
     half_width: float = parameter("output units", minimum=0)
 

@@ -13,5 +13,6 @@ class DroppedSamples(Effect):
     cause = "dropped_samples"
     stage = STAMPS
     explanation = "Some of the sensor's messages are lost."
+    experiment = "Number the messages at their source: missing numbers are messages that were lost."
 
     fraction: float = parameter("1", minimum=0, below=1)

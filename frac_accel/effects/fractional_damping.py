@@ -13,6 +13,8 @@ class FractionalDamping(Effect):
     cause = "fractional_damping"
     stage = CORE
     explanation = "The damping force follows a fractional derivative of the displacement."
+    experiment = ("Sweep from far below to far above the resonance: damping of another order "
+                  "turns the phase over decades, not at the resonance alone.")
 
     damping_order: float = parameter("1", above=0, below=2)
     damping_ratio: float = parameter("1", above=0, maximum=100)

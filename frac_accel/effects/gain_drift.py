@@ -17,6 +17,7 @@ class GainDrift(Effect):
     cause = "gain_drift"
     stage = GAIN
     explanation = "The sensitivity drifts with time."
+    experiment = "Keep level and temperature constant for longer: a drift goes on with time."
 
     rate_per_s: float = parameter("1/s")
 

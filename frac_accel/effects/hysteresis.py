@@ -19,6 +19,8 @@ class Hysteresis(Effect):
     cause = "hysteresis"
     stage = CORE
     explanation = "The spring's force depends on its path, so that it takes another way back."
+    experiment = ("Drive one slow sine at several levels: output over acceleration is a loop, "
+                  "which stays open however slow.")
 
     strength: float = parameter("1")
     beta: float = parameter("1/(output units)", minimum=0)

@@ -15,6 +15,8 @@ class LowPassLag(Effect):
     cause = "low_pass_lag"
     stage = CONDITIONER
     explanation = "A first-order low-pass in the conditioner makes fast motion smaller and later."
+    experiment = ("Excite up to several times the corner frequency: a low-pass takes amplitude "
+                  "away there, a delay does not.")
 
     corner_hz: float = parameter("Hz", above=0)
 

@@ -20,6 +20,8 @@ class MountingResonance(Effect):
     cause = "mounting_resonance"
     stage = MOUNTING
     explanation = "The mounting is a spring: it has a resonance of its own below the sensor."
+    experiment = ("Remount the sensor, or change the mounting's stiffness: a resonance of the "
+                  "mounting moves with it.")
 
     frequency_hz: float = parameter("Hz", above=0)
     damping_ratio: float = parameter("1", above=0, maximum=100)

@@ -13,6 +13,8 @@ class Offset(Effect):
     cause = "offset"
     stage = OFFSET
     explanation = "A constant is added to the output."
+    experiment = ("Record at rest, and once more with the sensor turned over: an offset does not "
+                  "turn with it.")
 
     offset: float = parameter("output units")
 

@@ -13,6 +13,8 @@ class QuadraticStiffness(Effect):
     cause = "quadratic_stiffness"
     stage = CORE
     explanation = "The spring is harder in one direction than in the other."
+    experiment = ("Repeat at half and at twice the level: the deviation grows with the square of "
+                  "the level, with a second harmonic and a shift of the mean.")
 
     alpha2: float = parameter("1/(output units)")
 

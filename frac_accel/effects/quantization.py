@@ -15,6 +15,7 @@ class Quantization(Effect):
     cause = "quantization"
     stage = QUANTIZATION
     explanation = "The output has a coarse resolution."
+    experiment = "Repeat at a tenth of the level: the steps between the values stay as large."
 
     step: float = parameter("output units", above=0)
 

@@ -15,6 +15,8 @@ class SensitivityError(Effect):
     cause = "sensitivity_error"
     stage = GAIN
     explanation = "The sensitivity differs from the model's by a constant ratio."
+    experiment = ("Compare with the reference at one frequency far below the resonance: a ratio "
+                  "of amplitudes other than 1 there is the sensitivity.")
 
     gain: float = parameter("1")
 

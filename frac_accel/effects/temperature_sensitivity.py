@@ -21,6 +21,8 @@ class TemperatureSensitivity(Effect):
     stage = GAIN
     explanation = "The sensitivity changes with temperature."
     needs_temperature = True
+    experiment = ("Run a temperature cycle at constant excitation, and record the temperature: "
+                  "the gain comes back with it, unlike a drift.")
 
     coefficient_per_k: float = parameter("1/K", minimum=-0.1, maximum=0.1)
 

@@ -13,6 +13,9 @@ class TimeDelay(Effect):
     cause = "time_delay"
     stage = DELAY
     explanation = "The samples are stamped later than the motion that they show."
+    experiment = ("Excite a wider band, up to frequencies where a delay of this size turns the "
+                  "phase by radians: its phase is a straight line over frequency, and no "
+                  "amplitude changes.")
 
     # no accelerometer is later than this: a larger number is in milliseconds
     delay_s: float = parameter("s", minimum=-10, maximum=10)

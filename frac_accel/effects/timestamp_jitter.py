@@ -13,5 +13,7 @@ class TimestampJitter(Effect):
     cause = "timestamp_jitter"
     stage = STAMPS
     explanation = "The stamps scatter around the instants at which the samples were taken."
+    experiment = ("Let the sensor's own clock or a hardware trigger stamp the samples: the "
+                  "scatter goes, and the error with it.")
 
     rms_s: float = parameter("s", minimum=0, maximum=10)

@@ -19,6 +19,7 @@ class ToneInterference(Effect):
     cause = "tone_interference"
     stage = INTERFERENCE
     explanation = "A tone from elsewhere, such as mains hum, is added to the output."
+    experiment = "Record at rest: a tone from elsewhere is still there."
 
     frequency_hz: float = parameter("Hz", above=0)
     amplitude: float = parameter("output units", minimum=0)

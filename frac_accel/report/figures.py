@@ -163,7 +163,8 @@ def time_signals(time_s, signals, residual=None, unit="output units"):
     time_s : ndarray, shape (n,)
     signals : dict of str to ndarray, shape (n,)
         NaN leaves a gap.
-    residual : ndarray, shape (n,), optional
+    residual : ndarray, shape (n,), or dict of str to ndarray, optional
+        A dict where several signals have one each, by their names.
     unit : str
 
     Returns
@@ -174,11 +175,16 @@ def time_signals(time_s, signals, residual=None, unit="output units"):
     labels = [f"output<br>[{unit}]", f"residual<br>[{unit}]"][:rows]
     figure = _rows(rows, 280 + 200 * (rows - 1), "time [s]", labels,
                    weights=(0.6, 0.4) if rows == 2 else None)
-    for (name, values), colour in zip(signals.items(), (MEASURED, *SERIES)):
+    colours = dict(zip(signals, (MEASURED, *SERIES)))
+    for name, values in signals.items():
         # the measured signal shows on both sides of the model that is drawn upon it
-        _line(figure, *envelope(time_s, values), 1, name, colour,
-              width=3 if colour is MEASURED else 1.2)
-    if residual is not None:
+        _line(figure, *envelope(time_s, values), 1, name, colours[name],
+              width=3 if colours[name] is MEASURED else 1.2)
+    if isinstance(residual, dict):
+        for name, values in residual.items():
+            _line(figure, *envelope(time_s, values), 2, f"residual of the {name}", colours[name],
+                  legend=False)
+    elif residual is not None:
         _line(figure, *envelope(time_s, residual), 2, "residual", RESIDUAL)
     return figure
 

@@ -9,9 +9,8 @@ from ..uncertainty import response_uncertainty
 from . import figures
 from .page import Page
 from .quantity import percent, rounded
+from .signals import close_up, segment, sentence, thinned
 
-# Periods of the reference's mean frequency in a close-up.
-_PERIODS = 25
 # Frequencies of the drawn response.
 _FREQUENCIES = 400
 # Two parameters that depend on each other more than this are named.
@@ -98,13 +97,13 @@ def _excitation(section, result, reference, sensor, pair):
     rate = pair.sampling_rate_hz
     moving = reference - reference.mean()
     rms, peak = np.std(moving), np.max(np.abs(moving))
-    section.text(_sentence(result.excitation["words"]))
+    section.text(sentence(result.excitation["words"]))
     section.text(f"{len(pair)} samples at {rate:.6g} Hz ({len(pair) / rate:.4g} s), of which "
                  f"{int(pair.valid.sum())} in both topics. The reference has power, and the sensor "
                  f"answers to it, from {low:.4g} Hz to {high:.4g} Hz; elsewhere the model is "
                  f"extrapolated. Acceleration without its mean: {rms:.4g} m/s² RMS, {peak:.4g} "
                  "m/s² peak.")
-    size = _segment(len(pair))
+    size = segment(len(pair))
     frequency, power = welch(reference, rate, "hann", size)
     section.figure(
         figures.spectra(frequency, {"reference": np.sqrt(power)}, "m/s²"),
@@ -141,7 +140,7 @@ def _response(section, result, axis):
     add(figures.response_deviation(curve, points, modelled),
         "The measured response relative to the model's. Bars and bands are 95 % intervals (k = 2).")
     if points.distortion:
-        section.text(_sentence(points.distortion["words"]))
+        section.text(sentence(points.distortion["words"]))
     if result.frequency_domain:
         _frequency_domain(section, result)
 
@@ -152,7 +151,7 @@ def _measured(points):
 
 def _frequency_domain(section, result):
     compared = result.frequency_domain
-    section.text(_sentence(compared["words"]))
+    section.text(sentence(compared["words"]))
     rows = []
     for name, entry in compared["parameters"].items():
         own = result.parameters[name]
@@ -172,8 +171,8 @@ def _residual(section, result, reference, sensor, pair):
                "model": sensor - residual}
     section.figure(figures.time_signals(time_s, signals, residual),
                    "Sensor's output, measured and by the model, and the residual"
-                   + _thinned(len(pair)))
-    length = _close_up(reference)
+                   + thinned(len(pair)))
+    length = close_up(reference)
     if len(pair) > 2 * length:
         part = strongest_stretch(sensor, length)
         section.figure(
@@ -181,7 +180,7 @@ def _residual(section, result, reference, sensor, pair):
                                                 for name, values in signals.items()},
                                  residual[part]),
             f"The {length} samples with the strongest output.")
-    size = _segment(len(pair))
+    size = segment(len(pair))
     frequency, output = welch(sensor, rate, "hann", size)
     judged = np.isfinite(residual)
     _, left = welch(np.where(judged, residual, 0), rate, "hann", size)
@@ -202,24 +201,3 @@ def _curve(model, frequency_hz, axis):
         frequency_hz, model.frequency_response(frequency_hz, axis),
         tuple((known.amplitude_interval / known.amplitude[:, None] - 1).T),
         tuple(np.radians(around).T)), known.method
-
-
-def _sentence(words):
-    return words[0].upper() + words[1:].rstrip(".") + "."
-
-
-def _close_up(reference):
-    """Number of samples in which single oscillations can be seen."""
-    frequency, power = welch(reference, nperseg=_segment(len(reference)))
-    return int(_PERIODS * power.sum() / (power @ frequency))
-
-
-def _segment(samples):
-    """Length of the segments of a spectrum: enough of them to average."""
-    return min(samples, max(256, min(samples // 8, 8192)))
-
-
-def _thinned(samples):
-    most = figures.MOST_POINTS
-    return (f". Thinned from {samples} samples to the extremes of {most // 2} stretches."
-            if samples > most else ".")
