@@ -103,7 +103,7 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
     """
     if start is None and len(sensor) > _START_LENGTH:
         # where the motion is strongest is enough to find out roughly where the parameters are
-        part = strongest_stretch(reference, _START_LENGTH)
+        part = strongest_stretch(reference, _START_LENGTH, valid)
         start = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
                          None if valid is None else valid[part], lag_s).solve(None).unknowns
     return _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s).solve(start)
