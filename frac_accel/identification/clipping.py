@@ -10,17 +10,22 @@ from .output_error import fit_output_error
 from .prediction import predicted
 from .structures import OscillatorStructure
 
-# Samples at the extreme, at least, and how much more than at any of the next distinct values: the
-# crests of a quantised sine come to 2.4 times the next level (the arcsine distribution).
-_FEWEST = 4
-_PILE_UP = 3
-_NEXT_VALUES = 5
+# Samples at the extreme, at least, and how much more than at any of the next distinct values. The
+# crests of a quantised sine come to 2.4 times the next level, too: the model tells them apart.
+_FEWEST = 8
+_PILE_UP = 1.5
+# What stands at one value for a larger share of the record rests there.
+_RESTING = 0.4
+_NEXT_VALUES = 2
 # How far beyond the limit the model goes in the middle of the clipped samples: steps of the
-# lattice (half a step is rounding), and standard deviations of what it leaves of the others.
+# lattice (half a step is rounding), standard deviations of what it leaves of the others, and of
+# the channel (a slightly nonlinear sensor stays below the model at its crests).
 _BEYOND_STEPS = 0.55
 _BEYOND_NOISE = 0.5
+_BEYOND = 0.05
 # Taps of the filter from sensor to reference on either side, and rows that it is fitted to.
 _TAPS = 8
+_ROWS_PER_TAP = 20
 _ROWS = 20_000
 
 
@@ -78,6 +83,8 @@ def clipped_reference(reference, sensor, valid):
     def model(others):
         delay = bulk_delay(reference, sensor)
         rows = np.flatnonzero(others)
+        if len(rows) < _ROWS_PER_TAP * (2 * _TAPS + 2):
+            raise IdentificationError("too little is left of the reference")
         rows = rows[::max(1, len(rows) // _ROWS)]
         taps = np.linalg.lstsq(_columns(sensor, rows, delay), reference[rows], rcond=1e-10)[0]
         return _columns(sensor, np.arange(len(sensor)), delay) @ taps
@@ -112,7 +119,8 @@ def _clipped(values, valid, model):
         # what the other samples cannot tell stays unknown; the fit of all of them will say why
         return Clipping(none, ())
     least = max(_BEYOND_STEPS * lattice_step(values[valid]),
-                _BEYOND_NOISE * np.std((values - expected)[others]))
+                _BEYOND_NOISE * np.std((values - expected)[others]),
+                _BEYOND * np.std(values[valid]))
     found = {side: samples for side, samples in suspect.items()
              if np.median(side * (expected - values)[samples]) > least}
     return Clipping(np.any([none, *found.values()], axis=0),
@@ -125,7 +133,8 @@ def _pile_up(values):
     if len(distinct) <= _NEXT_VALUES:
         return None
     next_count = counts[-1 - _NEXT_VALUES:-1].max()
-    return distinct[-1] if counts[-1] >= max(_FEWEST, _PILE_UP * next_count) else None
+    suspicious = max(_FEWEST, _PILE_UP * next_count) <= counts[-1] < _RESTING * len(values)
+    return distinct[-1] if suspicious else None
 
 
 def _columns(sensor, rows, delay):

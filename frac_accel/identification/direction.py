@@ -15,14 +15,20 @@ _LENGTH = 16384
 # RMS of the residual over its white part from which on the model lacks something.
 _LACKING = 2.0
 # Residual of the exchanged pair, of that of the pair, from which on its shape alone is decisive;
-# the same where the delays are on its side too; and of its output, where the pair has no model.
-# Right-way pairs of real and random sensors do not come below 0.3, and 0.5 with such delays.
+# the same where the delays are on its side too; and its residual, of its output, that a sensor
+# may have there and where the pair itself has no model.
 _SHAPE = 0.25
 _SHAPE_AND_DELAY = 0.4
+_SENSOR = 0.15
+# Largest damping ratio of a resonance that shows as a peak, with a margin: the inverse of a
+# well damped sensor may also be a link with a lead.
+_PEAK = 0.6
 _ALONE = 0.5
-# Standard uncertainties, and samples, by which a delay must be negative.
+# Standard uncertainties, and samples, by which a delay must be negative; samples by which it is
+# worth telling.
 _SIGNIFICANT = 3.0
 _SAMPLES = 0.1
+_NOTED = 0.5
 _KNOWN = 0.2
 
 
@@ -67,6 +73,12 @@ class _Way:
         """Whether the sensor needs no negative delay."""
         std = self.fit.std[self.fit.names.index("delay_s")]
         return self.fit["delay_s"] > -_SIGNIFICANT * std - _SAMPLES * self.sample_s
+
+    @property
+    def is_sensor(self):
+        """Whether it is a seismic sensor with a resonance, and little else."""
+        return self.determined and self.unexplained < _SENSOR \
+            and self.fit["damping_ratio"] < _PEAK
 
     @property
     def determined(self):
@@ -123,17 +135,20 @@ def judge_direction(fit, reference, sensor, pair):
         return []
     forward = _Way.of(reference, sensor, pair, pair.lag_s)
     if forward is None:
+        error = exchanged_instead(reference, sensor, pair)
+        if error is not None:
+            raise error
         return []
     if forward.fit.rmse > _LACKING * white_noise(forward.fit.residual):
         backward = _Way.of(sensor, reference, pair, -pair.lag_s)
-        if backward is not None and backward.determined:
+        if backward is not None and backward.is_sensor:
             ratio = backward.unexplained / forward.unexplained
             if ratio < _SHAPE or (ratio < _SHAPE_AND_DELAY and forward.early and backward.causal):
                 raise _error("the best sensor leaves "
                              f"{forward.unexplained:.2%} of the output unexplained", backward)
-    if forward.early:
-        return [f"the sensor answers {forward.lead_s:.3g} s before the reference moves: either its "
-                "stamps are early by that much, or reference and sensor are exchanged"]
+    if forward.early and forward.lead_s > _NOTED * forward.sample_s:
+        return [f"the sensor answers {forward.lead_s:.3g} s before the reference moves: its stamps "
+                "are early by that much, it is AC-coupled, or reference and sensor are exchanged"]
     return []
 
 

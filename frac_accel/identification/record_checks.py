@@ -14,14 +14,19 @@ from .frequency_response import bulk_delay
 _SAME = 1e-6
 # Steps of a rounded copy, of its standard deviation, below which a sensor of its own would show.
 _FINE = 0.01
+# Steps by which rounding, and the uncertainty of the factor between two copies, set them apart.
+_ROUNDING = 0.55
 _DIGITS = 8
 # Least eigenvalue of the axes' correlation matrix: 1 - r for two axes of correlation r.
 _COLLINEAR = 1e-4
 # Equal samples in a row that make a standstill, and the other topic's motion meanwhile: of its
 # usual motion, and in steps of the one that stands still.
 _STANDSTILL = 32
-_MOVING = 0.1
+_MOVING = 0.5
 _STEPS = 3
+# A reference may rest while the sensor rings: it is lost where it jumps to its standstill or from
+# it by this share of its standard deviation, or stands so far from its median.
+_JUMP = 0.3
 # Shares of clipped samples that can be left out. A sensor's are only fewer equations; the
 # reference's are motion that nobody knows, which the sensor answers to for a while.
 _CLIPPED_SENSOR = 0.3
@@ -95,7 +100,7 @@ def _require_no_copy(reference, sensor, valid):
     if largest > _FINE * spread:
         return
     step = max(lattice_step(y), _decimal_step(y, _FINE * spread))
-    if largest <= max(_SAME * np.max(np.abs(y)), 0.51 * step * (step < _FINE * spread)):
+    if largest <= max(_SAME * np.max(np.abs(y)), _ROUNDING * step * (step < _FINE * spread)):
         later = f", {delay} sample(s) later" if delay else ""
         raise IdentificationError(
             "the sensor's topic is a copy of the reference: apart from rounding, each of its "
@@ -140,16 +145,18 @@ def _dependent(values):
 def _moving(reference, sensor, pair):
     """Valid instants without those at which one topic stands still while the other moves."""
     moving, notes = pair.valid.copy(), []
-    for name, other_name, values, other in (("sensor", "reference", sensor, reference),
-                                            ("reference", "sensor", reference, sensor)):
-        runs = _standstills(values, other, pair.valid)
+    sensor_runs = _standstills(sensor, reference, pair.valid)
+    reference_runs = [run for run in _standstills(reference, sensor, pair.valid)
+                      if _off_its_rest(reference, run, pair.valid)]
+    for name, other, values, runs in (("sensor", "reference", sensor, sensor_runs),
+                                      ("reference", "sensor", reference, reference_runs)):
         if not runs:
             continue
         still = sum(stop - start for start, stop in runs)
         start, stop = (place / pair.sampling_rate_hz for place in runs[0])
         more = f" and {len(runs) - 1} more time(s)" if len(runs) > 1 else ""
         words = (f"the {name} stands still at {values[runs[0][0]]:.6g} from {start:.4g} s to "
-                 f"{stop:.4g} s{more} while the {other_name} moves")
+                 f"{stop:.4g} s{more} while the {other} moves")
         for start, stop in runs:
             moving[start:stop] = False
         if moving.sum() < _LEFT * len(pair):
@@ -178,6 +185,15 @@ def _standstills(values, other, valid):
     # what comes to the same extreme again and again is clipped
     at = [values[start] for start, _ in runs]
     return [run for run, value in zip(runs, at) if value not in extremes or at.count(value) == 1]
+
+
+def _off_its_rest(values, run, valid):
+    """Whether values jump to a standstill or from it, or stand apart from their median."""
+    start, stop = run
+    before, after = np.flatnonzero(valid[:start]), stop + np.flatnonzero(valid[stop:])
+    steps = [abs(values[start] - np.median(values[valid])),
+             *(abs(values[start] - values[place]) for place in (*before[-1:], *after[:1]))]
+    return max(steps) > max(_JUMP * np.std(values[valid]), _STEPS * lattice_step(values[valid]))
 
 
 def _unclipped(reference, sensor, valid, pair):
