@@ -13,16 +13,22 @@ from ..errors import FracAccelError, IdentificationError
 from ..model import AXES, SensorModel
 from ..pair import Pair, load_pair
 from ..parameters import parameter_fields, unit_of
-from ..simulation import simulate
 from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
-from .excitation import excited_band, learning_length, require_excitation
+from .direction import exchanged_instead, judge_direction
+from .excitation import ExcitationCheck, learning_length, require_excitation
+from .fit_checks import far_apart, require_time_to_answer
 from .frequency_response import linear_share
 from .measured_response import MeasuredResponse
+from .open_parameters import open_combinations
 from .output_error import Fit, fit_output_error
 from .points import ResponsePoints, response_points
+from .prediction import predicted
+from .record_checks import RecordCheck, check_record
 from .structures import FractionalStructure, OscillatorStructure
+from .uncertainty import white_noise
 
-__all__ = ["STRUCTURES", "Identification", "ResponsePoints", "identify", "response_points"]
+__all__ = ["STRUCTURES", "ExcitationCheck", "Identification", "ResponsePoints", "identify",
+           "response_points"]
 
 # A standard uncertainty above this share of its value: the data do not determine the parameter.
 _UNDETERMINED = 0.2
@@ -30,6 +36,8 @@ _UNDETERMINED = 0.2
 _SIGNIFICANT = 3.0
 # Share of an oscillator's held-out residual that a model which names no cause may leave.
 _CLEARLY = 0.7
+# Residual from which on the two topics may belong together in another way.
+_POOR = 0.7
 _STRUCTURES = {"arx": ArxStructure(), "oscillator": OscillatorStructure(),
                "fractional": FractionalStructure()}
 STRUCTURES = ("auto", *_STRUCTURES)
@@ -63,6 +71,8 @@ class Identification:
     frequency_domain : dict or None
         The same structure fitted to the points, and how far its parameters are from those above
         (`compare_domains`); None for ARX and without points.
+    excitation_check : ExcitationCheck
+        How the reference has excited the sensor, and how much of the record counts.
     """
 
     model: SensorModel
@@ -76,6 +86,7 @@ class Identification:
     excitation: dict
     points: ResponsePoints | None
     frequency_domain: dict | None
+    excitation_check: ExcitationCheck
 
     def as_dict(self):
         """Plain numbers, lists and the model's content."""
@@ -83,6 +94,7 @@ class Identification:
                 "reason": self.reason, "parameters": self.parameters,
                 "nrmse": self.nrmse, "held_out_nrmse": self.held_out_nrmse, "notes": self.notes,
                 "excitation": self.excitation,
+                "excitation_check": dataclasses.asdict(self.excitation_check),
                 "points": None if self.points is None else self.points.as_dict(),
                 "frequency_domain": self.frequency_domain}
 
@@ -119,7 +131,11 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None):
                              f"{', '.join(STRUCTURES)}")
     if isinstance(pair, (str, Path)):
         pair = load_pair(pair, axis=axis)
-    data = _Data.of(pair, axis, progress or (lambda words: None))
+    progress = progress or (lambda words: None)
+    require_excitation(pair.reference[:, AXES.index(axis)], pair.sampling_rate_hz,
+                       FEWEST_COEFFICIENTS)
+    progress("checking the record")
+    data = _Data.of(check_record(pair, axis), axis, progress)
     if structure == "auto":
         chosen, reason = _choose(data)
     else:
@@ -129,6 +145,7 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None):
 
 @dataclasses.dataclass(frozen=True)
 class _Data:
+    record: RecordCheck
     pair: Pair
     reference: np.ndarray
     sensor: np.ndarray
@@ -137,12 +154,12 @@ class _Data:
     progress: Callable
 
     @classmethod
-    def of(cls, pair, axis, progress):
-        column = AXES.index(axis)
+    def of(cls, record, axis, progress):
+        pair, column = record.pair, AXES.index(axis)
         reference, sensor = pair.reference[:, column], pair.sensor[:, column]
         progress("measuring the frequency response")
-        return cls(pair, reference, sensor, float(np.std(sensor)), MeasuredResponse.of(pair, axis),
-                   progress)
+        return cls(record, pair, reference, sensor, float(np.std(sensor[pair.valid])),
+                   MeasuredResponse.of(pair, axis), progress)
 
     def fit(self, structure, part=slice(None), start=None):
         if start is None:
@@ -167,12 +184,20 @@ class _Candidate:
     @classmethod
     def of(cls, name, data):
         structure = _STRUCTURES[name]
-        require_excitation(data.reference, data.pair.sampling_rate_hz,
-                           max(len(structure.names) + 2, FEWEST_COEFFICIENTS))
+        require_excitation(data.reference, data.pair.sampling_rate_hz, _coefficients(structure))
         data.progress(f"fitting the {name} structure")
-        fit = data.fit(structure)
+        try:
+            fit = data.fit(structure)
+        except IdentificationError as error:
+            record = data.reference, data.sensor, data.pair
+            raise exchanged_instead(*record) or far_apart(*record) or error from None
         data.progress(f"judging the {name} structure on held-out data")
         return cls(structure, name, fit, fit.rmse / data.spread, _held_out(structure, fit, data))
+
+
+def _coefficients(structure):
+    """Parameters that the excitation must suffice for: also sensitivity and delay."""
+    return max(len(structure.names) + 2, FEWEST_COEFFICIENTS)
 
 
 def _choose(data):
@@ -214,11 +239,14 @@ def _choose_oscillator(data):
 
 def _identification(chosen, reason, data, axis, provenance):
     fit, rate = chosen.fit, data.pair.sampling_rate_hz
-    low, high = excited_band(data.reference, data.sensor, rate)
+    suspicions = _require_plausible(chosen, data)
+    excitation = ExcitationCheck.of(data.record, data.reference, data.sensor,
+                                    _coefficients(chosen.structure))
     parameters = {name: {"value": float(value), "std": float(std), "unit": _unit(name)}
                   for name, value, std in zip(fit.names, fit.values, fit.std)}
     compared, more = data.response.compared(chosen.structure, fit)
-    notes = _notes(parameters, chosen, data, high) + data.response.notes + more
+    notes = (data.record.notes + suspicions + _notes(parameters, chosen, data, excitation.band_hz)
+             + data.response.notes + more)
     effects = [TimeDelay(fit["delay_s"])]
     if abs(fit["offset"]) > _SIGNIFICANT * parameters["offset"]["std"]:
         effects.append(Offset(fit["offset"]))
@@ -226,9 +254,9 @@ def _identification(chosen, reason, data, axis, provenance):
         "uncertainties": {name: {"std": entry["std"], "unit": entry["unit"]}
                           for name, entry in parameters.items()},
         "covariance": {"parameters": list(fit.names), "matrix": fit.covariance.tolist()},
-        "band_hz": [low, high],
+        "band_hz": list(excitation.band_hz),
         "sampling_rate_hz": rate,
-        "noise_std": _noise(fit.residual),
+        "noise_std": white_noise(fit.residual),
         "provenance": {"axis": axis, "structure": chosen.name, "reason": reason, **provenance},
         "validation": {"nrmse": chosen.nrmse, "held_out_nrmse": chosen.held_out_nrmse,
                        "notes": notes},
@@ -237,7 +265,18 @@ def _identification(chosen, reason, data, axis, provenance):
     })
     return Identification(model, chosen.name, reason, parameters, chosen.nrmse,
                           chosen.held_out_nrmse, notes, fit.residual, data.response.excitation,
-                          data.response.points, compared)
+                          data.response.points, compared, excitation)
+
+
+def _require_plausible(chosen, data):
+    """Refuse a fit that no sensor can be behind; notes on what is suspicious."""
+    fit, record = chosen.fit, (data.reference, data.sensor, data.pair)
+    apart = far_apart(*record) if chosen.nrmse > _POOR else None
+    if apart is not None:
+        raise apart
+    require_time_to_answer(fit, data.pair)
+    data.progress("judging the direction from reference to sensor")
+    return judge_direction(fit, *record)
 
 
 def _unit(name):
@@ -248,53 +287,37 @@ def _unit(name):
                 if name in (field.name for field in parameter_fields(cls)))
 
 
-def _noise(residual):
-    """White part of the residual: what is left above half the Nyquist frequency, spread evenly.
-
-    Below, the residual also holds what the model gets wrong, which is not noise.
-    """
-    clean = np.nan_to_num(residual)
-    power = np.abs(np.fft.rfft(clean * np.hanning(len(clean))))**2
-    window = np.sum(np.hanning(len(clean))**2)
-    # the median of a chi-squared of two degrees is ln 2 of its mean
-    return float(np.sqrt(np.median(power[len(power) // 2:]) / np.log(2) / window))
-
-
 def _held_out(structure, fit, data):
     """Residual on the last part of the record of a model fitted to the rest alone."""
     pair = data.pair
-    split = learning_length(data.reference)
+    split = learning_length(data.reference, pair.valid)
     rest = slice(split, None)
-    if len(pair) - split < 256 or split < 256:
+    if min(pair.valid[:split].sum(), pair.valid[rest].sum()) < 256:
         return float("nan")
     try:
         learnt = data.fit(structure, slice(split), start=fit.unknowns)
-        # the pair's lag belongs to the stamps, not to the sensor
-        model = SensorModel(structure.core(learnt), [TimeDelay(learnt["delay_s"] - pair.lag_s),
-                                                     Offset(learnt["offset"])])
+        # over the whole record, so that the held-out part begins with its true history
+        simulated = predicted(structure, learnt, data.reference, pair.sampling_rate_hz, pair.lag_s)
     except FracAccelError:
         return float("nan")
-    # simulated over the whole record, so that the held-out part begins with its true history
-    simulated = simulate(model, data.reference, pair.sampling_rate_hz, axis="x", initial="steady")
     error = (data.sensor - simulated)[rest][pair.valid[rest]]
     spread = np.std(data.sensor[rest][pair.valid[rest]])
     # without its mean: motion long before the record still shows there as a constant
     return float(np.std(error) / spread) if spread > 0 else float("nan")
 
 
-def _notes(parameters, chosen, data, highest):
-    fit, pair, nrmse, held_out = chosen.fit, data.pair, chosen.nrmse, chosen.held_out_nrmse
-    notes = fit.notes() if isinstance(fit, ArxFit) else _seismic_notes(parameters, chosen, highest)
-    noise = _noise(fit.residual)
+def _notes(parameters, chosen, data, band_hz):
+    fit, nrmse, held_out = chosen.fit, chosen.nrmse, chosen.held_out_nrmse
+    notes = fit.notes() if isinstance(fit, ArxFit) else [
+        *_seismic_notes(parameters, chosen, band_hz[1]),
+        *open_combinations(fit, band_hz, data.pair.sampling_rate_hz)]
+    noise = white_noise(fit.residual)
     if nrmse > 1e-3 and fit.rmse > 3 * noise:
         notes.append(f"the model leaves {nrmse:.2%} of the output unexplained, while its white "
                      f"noise is {noise / data.spread:.2%}: something real is missing from it")
     if np.isfinite(held_out) and held_out > max(2 * nrmse, 1e-3):
         notes.append(f"held-out data are predicted worse ({held_out:.2%}) than the fitted "
                      f"({nrmse:.2%})")
-    missing = int(np.sum(~pair.valid))
-    if missing:
-        notes.append(f"{missing} of {len(pair)} instants have no sample in one of the topics")
     return notes
 
 

@@ -174,7 +174,7 @@ def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=No
     valid = np.ones(len(sensor), bool) if valid is None else valid
     if start is None:
         most = persistent_excitation(reference, sampling_rate_hz)[0]
-        part = strongest_stretch(reference, _CHOICE_LENGTH)
+        part = strongest_stretch(reference, _CHOICE_LENGTH, valid)
         start = _widened(*_choose(reference[part], sensor[part], valid[part], most), most)
     orders, coefficients = start
     record = _Record(reference, sensor, valid, orders)

@@ -103,7 +103,7 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
     """
     if start is None and len(sensor) > _START_LENGTH:
         # where the motion is strongest is enough to find out roughly where the parameters are
-        part = strongest_stretch(reference, _START_LENGTH)
+        part = strongest_stretch(reference, _START_LENGTH, valid)
         start = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
                          None if valid is None else valid[part], lag_s).solve(None).unknowns
     return _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s).solve(start)
@@ -127,6 +127,8 @@ class _Problem:
         self.all_used = slice(min(_EDGE, self.n // 8), self.n - min(_EDGE, self.n // 8)) \
             if used.sum() == self.n - 2 * min(_EDGE, self.n // 8) else used
         self.sensor = sensor[self.all_used]
+        if np.ptp(self.sensor) == 0:
+            raise IdentificationError("the sensor's output is constant where it counts")
         self.size = float(np.std(self.sensor))
         self.reference = reference
         self.whole = sensor

@@ -46,3 +46,15 @@ def sandwich(jacobian, residual, used):
     root = bread @ (directions * np.sqrt(np.maximum(strengths, 0))) / scale[:, None]
     freedom = len(residual) / max(len(residual) - jacobian.shape[1], 1)
     return freedom * root @ root.T
+
+
+def white_noise(residual):
+    """White part of the residual: what is left above half the Nyquist frequency, spread evenly.
+
+    Below, the residual also holds what the model gets wrong, which is not noise.
+    """
+    clean = np.nan_to_num(residual)
+    power = np.abs(np.fft.rfft(clean * np.hanning(len(clean))))**2
+    window = np.sum(np.hanning(len(clean))**2)
+    # the median of a chi-squared of two degrees is ln 2 of its mean
+    return float(np.sqrt(np.median(power[len(power) // 2:]) / np.log(2) / window))
