@@ -22,11 +22,15 @@ _BLOCKS = 20
 
 
 @dataclasses.dataclass(frozen=True)
-class ExcitationCheck:
+class Excitation:
     """How the reference has excited the sensor, and how much of the record counts.
 
     Attributes
     ----------
+    kind : str
+        See `Recognised`.
+    description : str
+        The kind in words, with its main figures.
     order : int
         Order of persistent excitation.
     needed : int
@@ -45,6 +49,8 @@ class ExcitationCheck:
         the other moved.
     """
 
+    kind: str
+    description: str
     order: int
     needed: int
     band_hz: tuple
@@ -60,14 +66,15 @@ class ExcitationCheck:
     standing: int
 
     @classmethod
-    def of(cls, record, reference, sensor, needed):
-        """Of one axis of a `RecordCheck`."""
+    def of(cls, record, reference, sensor, needed, recognised):
+        """Of one axis of a `RecordCheck`, its kind as recognised."""
         pair = record.pair
         motion = np.where(pair.valid, reference - reference[pair.valid].mean(), np.nan)
         levels = [float(np.sqrt(np.nanmean(block**2)))
                   for block in np.array_split(motion, _BLOCKS) if np.isfinite(block).any()]
         rms, peak = float(np.sqrt(np.nanmean(motion**2))), float(np.nanmax(np.abs(motion)))
-        return cls(persistent_excitation(reference, pair.sampling_rate_hz)[0], needed,
+        return cls(recognised.kind, recognised.words,
+                   persistent_excitation(reference, pair.sampling_rate_hz)[0], needed,
                    excited_band(reference, sensor, pair.sampling_rate_hz), rms, peak, peak / rms,
                    min(levels), max(levels), pair.sensor_std, len(pair), record.missing,
                    record.clipped, record.standing)
@@ -79,8 +86,9 @@ class ExcitationCheck:
         left_out = [f"{count} {what}" for count, what in (
             (self.missing, "missing"), (self.clipped, "clipped"),
             (self.standing, "standing still")) if count]
-        return (f"excitation of order {self.order} (at least {self.needed} needed) from {low:.4g} "
-                f"to {high:.4g} Hz; samples left out: {', '.join(left_out) or 'none'}\n"
+        return (f"{self.description}; excited from {low:.4g} to {high:.4g} Hz, of order "
+                f"{self.order} (at least {self.needed} needed)"
+                f"{'; samples left out: ' if left_out else ''}{', '.join(left_out)}\n"
                 f"reference RMS {self.rms:.4g} m/s^2 ({self.quietest_rms:.3g} to "
                 f"{self.loudest_rms:.3g} along the record), peak {self.peak:.4g} m/s^2, crest "
                 f"factor {self.crest_factor:.3g}")

@@ -333,8 +333,10 @@ class _Problem:
         offset = linear[1] - linear[0] * self.level
         values = np.r_[linear[0], own, theta[-1] / self.rate, offset]
         names = ("sensitivity", *self.structure.names, "delay_s", "offset")
-        keep = len(names)
-        return Fit(names, values, covariance[:keep, :keep], full, theta)
+        # the fitted constant is the offset and the response to the level: other covariances, too
+        factors = np.eye(len(names), len(covariance))
+        factors[-1, 0] = -self.level
+        return Fit(names, values, factors @ covariance @ factors.T, full, theta)
 
 
 def _real(values):
