@@ -264,6 +264,13 @@ def _combined(name, datas, records):
     combination = combine(fits)
     joint = dataclasses.replace(fits[0], values=combination.values,
                                 covariance=combination.covariance)
+    try:
+        structure.core(joint).require_stable("core")
+    except FracAccelError:
+        raise IdentificationError(
+            f"the records' models contradict each other so much (chi-squared "
+            f"{combination.statistic:.3g} of {combination.freedom} degrees of freedom) that their "
+            "mean is not stable; identify each record by itself") from None
     joined = [_predicted(structure, joint, data, _settled(structure, joint, data))
               for data in datas]
     tests = [judge_residual(structure.core(fit), fit, data.reference, data.pair)
