@@ -11,7 +11,7 @@ from frac_accel import SensorModel, identify
 from frac_accel.bag import write_bag
 from frac_accel.cli import main
 from frac_accel.errors import IdentificationError
-from frac_accel.identification.records import combine
+from frac_accel.identification.records import agreement, combine
 from frac_accel.pair import make_pair
 from frac_accel.samples import Samples
 
@@ -125,6 +125,30 @@ def test_transfer_functions_of_several_records_have_the_same_orders():
     true = SensorModel.from_dict(sensor.to_model()).frequency_response(frequency)
     error = np.abs(result.model.frequency_response(frequency) / true - 1)
     assert np.median(error) < 0.01
+
+
+def test_open_parameters_have_a_mean():
+    """A resonance 15 times above the excitation: linearised covariances of it mean nothing."""
+    rng = np.random.default_rng(20338)
+    sensor = rig.draw_sensor(rng, RATE_HZ, "classical", ["time_delay"],
+                             natural_frequency=(0.3, 0.3), damping_ratio=(0.5, 1.0))
+    pairs = pairs_of(rng, sensor, sensor, band_hz=(1.0, 40.0), snr_db=30.0)
+    result = identify(pairs, structure="oscillator")
+    assert result.validation.records.agree
+    assert np.all(result.validation.records.std[:, 1] > result.validation.records.values[:, 1])
+    sensitivity = result.parameters["sensitivity"]
+    assert abs(sensitivity["value"] - sensor.core["sensitivity"]) < 4 * sensitivity["std"]
+    assert result.held_out_nrmse == pytest.approx(10 ** (-30 / 20), rel=0.2)
+
+
+def test_a_difference_that_the_parameters_leave_open_is_said():
+    """Equal parameters, but each model predicts the other record badly."""
+    table = np.array([[0.07, 0.22], [0.15, 0.09]])
+    records = agreement(
+        ["a", "b"], [Estimate(np.array([1.0, 0.0, 0.0]), np.eye(3))] * 2,
+        combine([Estimate(np.array([1.0, 0.0, 0.0]), np.eye(3))] * 2), table, [0.1, 0.1], True)
+    assert "but not in what they predict: b to 22.00% by the model of a, to 9.00%" \
+        in records.words()
 
 
 @dataclasses.dataclass

@@ -10,6 +10,11 @@ from .residual_tests import SIGNIFICANCE
 
 # It changes with temperature and with how the sensor lies: no sign of another sensor.
 _OWN_TO_EACH_RECORD = ("offset",)
+_POSITIVE = ("natural_frequency_hz", "damping_ratio")
+# Residual with another record's model, over that with its own, from which the records differ.
+_PREDICTED_WORSE = 1.5
+# Relative standard uncertainty of those with which they are open.
+_OPEN = 0.5
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -18,6 +23,12 @@ class Combination:
 
     .. math:: \hat\theta = C \sum_i C_i^{-1} \theta_i, \quad C = \Big(\sum_i C_i^{-1}\Big)^{-1},
               \quad \chi^2 = \sum_i (\theta_i - \hat\theta)^T C_i^{-1} (\theta_i - \hat\theta)
+
+    where the parameters that have bounds enter in coordinates without (the logarithms of frequency
+    and damping). Of fits that disagree, the correlations would carry such a mean far outside all of
+    them (Peelle's puzzle, D. L. Smith, *Probability, Statistics, and Data Uncertainties in Nuclear
+    Science and Technology*, 1991): each parameter is then averaged with its own variances alone,
+    as where a fit leaves a frequency or damping open, for which a covariance means little.
 
     Attributes
     ----------
@@ -92,9 +103,15 @@ class RecordAgreement:
     def words(self):
         """The verdict as a sentence."""
         if self.agree:
-            return (f"the {len(self.records)} records agree on the parameters "
-                    f"({p_words(self.p_value)}); the model is their mean, weighted by the inverse "
-                    "covariances")
+            agreed = f"the {len(self.records)} records agree on the parameters " \
+                     f"({p_words(self.p_value)})"
+            own = np.diag(self.nrmse)
+            model, judged = np.unravel_index(np.nanargmax(self.nrmse / own), self.nrmse.shape)
+            if self.nrmse[model, judged] > _PREDICTED_WORSE * own[judged]:
+                return (f"{agreed}, as far as these are determined, but not in what they predict: "
+                        f"{self.records[judged]} to {self.nrmse[model, judged]:.2%} by the model "
+                        f"of {self.records[model]}, to {own[judged]:.2%} by its own")
+            return f"{agreed}; the model is their mean"
         reason = "not the same sensor or not the same mounting" if self.complete else \
             "the model lacks something, or it is not the same sensor or not the same mounting"
         return (f"the records disagree ({p_words(self.p_value)}): {self.worst_parameter} differs "
@@ -126,16 +143,24 @@ def combine(fits):
     names = fits[0].names
     estimated = np.all([fit.std > 0 for fit in fits], axis=0)
     shared = estimated & [name not in _OWN_TO_EACH_RECORD for name in names]
-    values, covariance = fits[0].values.copy(), np.zeros_like(fits[0].covariance)
-    place = np.ix_(estimated, estimated)
-    values[estimated], covariance[place], _ = _weighted_mean(
-        [fit.values[estimated] for fit in fits], [fit.covariance[place] for fit in fits])
+    free = [_unbounded(names, fit.values) for fit in fits]
+    points = [point for point, _ in free]
+    spreads = [fit.covariance * np.outer(slope, slope) for fit, (_, slope) in zip(fits, free)]
     place = np.ix_(shared, shared)
-    *_, statistic = _weighted_mean([fit.values[shared] for fit in fits],
-                                   [fit.covariance[place] for fit in fits])
+    statistic = _statistic([point[shared] for point in points],
+                           [matrix[place] for matrix in spreads])
     freedom = int((len(fits) - 1) * shared.sum())
     p_value = float(chi2.sf(statistic, freedom))
-    birge = float(np.sqrt(statistic / freedom)) if p_value < SIGNIFICANCE else 1.0
+    disagree = p_value < SIGNIFICANCE
+    birge = float(np.sqrt(statistic / freedom)) if disagree else 1.0
+    mean, spread = points[0].copy(), np.zeros_like(spreads[0])
+    place = np.ix_(estimated, estimated)
+    is_open = any(fit.std[i] > _OPEN * fit.values[i] for fit in fits
+                  for i, name in enumerate(names) if name in _POSITIVE)
+    mean[estimated], spread[place] = (_separate_means if disagree or is_open else _weighted_mean)(
+        [point[estimated] for point in points], [matrix[place] for matrix in spreads])
+    values, slope = _bounded(names, mean)
+    covariance = spread * np.outer(slope, slope)
     return Combination(values, covariance * birge**2, statistic, freedom, p_value, birge)
 
 
@@ -154,14 +179,60 @@ def agreement(names, fits, combination, nrmse, combined_nrmse, complete):
         float(difference), bool(complete))
 
 
+def _separate_means(values, covariances):
+    """Like `_weighted_mean`, each value with its own variances alone."""
+    weights = np.array([1 / np.diag(covariance) for covariance in covariances])
+    weights /= weights.sum(axis=0)
+    covariance = sum(np.outer(weight, weight) * matrix
+                     for weight, matrix in zip(weights, covariances))
+    return np.sum(weights * values, axis=0), covariance
+
+
+def _unbounded(names, values):
+    """Values in coordinates without bounds, and their derivatives by the values."""
+    points, slopes = np.array(values, float), np.ones(len(names))
+    for i, name in enumerate(names):
+        if name in _POSITIVE:
+            points[i], slopes[i] = np.log(values[i]), 1 / values[i]
+        elif name == "damping_order":
+            rest = 2 - values[i]
+            points[i], slopes[i] = np.log(values[i] / rest), 2 / (values[i] * rest)
+    return points, slopes
+
+
+def _bounded(names, points):
+    """Inverse of `_unbounded`: values, and their derivatives by the coordinates."""
+    values = np.array(points, float)
+    for i, name in enumerate(names):
+        if name in _POSITIVE:
+            values[i] = np.exp(points[i])
+        elif name == "damping_order":
+            values[i] = 2 / (1 + np.exp(-points[i]))
+    return values, 1 / _unbounded(names, values)[1]
+
+
 def _weighted_mean(values, covariances):
-    """Weighted mean, its covariance and chi-squared."""
-    scale = np.sqrt(np.mean([np.diag(covariance) for covariance in covariances], axis=0))
-    weights = [np.linalg.pinv(covariance / np.outer(scale, scale), 1e-12, hermitian=True)
-               for covariance in covariances]
-    scaled = [value / scale for value in values]
+    """Mean weighted by the inverse covariances, and its covariance."""
+    scale = _scale(covariances)
+    weights = _weights(covariances, scale)
     covariance = np.linalg.pinv(sum(weights), 1e-12, hermitian=True)
-    mean = covariance @ sum(weight @ value for weight, value in zip(weights, scaled))
-    statistic = sum((value - mean) @ weight @ (value - mean)
-                    for weight, value in zip(weights, scaled))
-    return mean * scale, covariance * np.outer(scale, scale), float(statistic)
+    mean = covariance @ sum(weight @ (value / scale) for weight, value in zip(weights, values))
+    return mean * scale, covariance * np.outer(scale, scale)
+
+
+def _statistic(values, covariances):
+    """Chi-squared of the values against their weighted mean."""
+    scale = _scale(covariances)
+    mean, _ = _weighted_mean(values, covariances)
+    errors = [(value - mean) / scale for value in values]
+    return float(sum(error @ weight @ error
+                     for weight, error in zip(_weights(covariances, scale), errors)))
+
+
+def _scale(covariances):
+    return np.sqrt(np.mean([np.diag(covariance) for covariance in covariances], axis=0))
+
+
+def _weights(covariances, scale):
+    return [np.linalg.pinv(covariance / np.outer(scale, scale), 1e-12, hermitian=True)
+            for covariance in covariances]

@@ -98,7 +98,7 @@ def _excitation(section, result, reference, sensor, pair):
     rate = pair.sampling_rate_hz
     moving = reference - reference.mean()
     rms, peak = np.std(moving), np.max(np.abs(moving))
-    section.text(_sentence(result.excitation["words"]))
+    section.text(_sentence(result.excitation.description))
     section.text(f"{len(pair)} samples at {rate:.6g} Hz ({len(pair) / rate:.4g} s), of which "
                  f"{int(pair.valid.sum())} in both topics. The reference has power, and the sensor "
                  f"answers to it, from {low:.4g} Hz to {high:.4g} Hz; elsewhere the model is "

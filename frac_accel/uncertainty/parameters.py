@@ -152,6 +152,8 @@ class UncertainAxis:
                 step = np.zeros(len(self.values))
                 step[i] = _STEP * (abs(self.values[i]) or 1.0)
                 above, below = self.at(self.values + step), self.at(self.values - step)
+                if above is None and below is None:
+                    raise ModelError(f"{name}: {self.values[i]:g} is outside its range")
                 # at the edge of stability only one side can be had
                 step_length = step[i] * ((above is not None) + (below is not None))
                 upper, lower = (model or self.axis for model in (above, below))
