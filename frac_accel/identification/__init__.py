@@ -118,12 +118,12 @@ class _Data:
         sensor = pair.sensor[:, column]
         return cls(pair, pair.reference[:, column], sensor, float(np.std(sensor)), progress)
 
-    def fit(self, structure, part=slice(None), start=None):
+    def fit(self, structure, part=slice(None), start=None, uncertainty=True):
         record = (self.reference[part], self.sensor[part], self.pair.sampling_rate_hz,
                   self.pair.valid[part], self.pair.lag_s, start)
         if isinstance(structure, ArxStructure):
             return fit_arx(*record)
-        return fit_output_error(structure, *record)
+        return fit_output_error(structure, *record, uncertainty)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -220,7 +220,7 @@ def _held_out(structure, fit, data):
     if len(pair) - split < 256 or split < 256:
         return float("nan")
     try:
-        learnt = data.fit(structure, slice(split), start=fit.unknowns)
+        learnt = data.fit(structure, slice(split), start=fit.unknowns, uncertainty=False)
         # the pair's lag belongs to the stamps, not to the sensor
         model = SensorModel(structure.core(learnt), [TimeDelay(learnt["delay_s"] - pair.lag_s),
                                                      Offset(learnt["offset"])])
