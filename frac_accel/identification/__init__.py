@@ -17,7 +17,11 @@ from ..simulation import simulate
 from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
 from .excitation import excited_band, learning_length, require_excitation
 from .output_error import Fit, fit_output_error
-from .structures import FractionalStructure, OscillatorStructure
+from .structures import (
+    FractionalStructure,
+    FractionalTransferFunctionStructure,
+    OscillatorStructure,
+)
 
 __all__ = ["STRUCTURES", "Identification", "identify"]
 
@@ -26,7 +30,8 @@ _UNDETERMINED = 0.2
 # Standard uncertainties by which the damping order must differ from 1 to be called fractional.
 _SIGNIFICANT = 3.0
 _STRUCTURES = {"arx": ArxStructure(), "oscillator": OscillatorStructure(),
-               "fractional": FractionalStructure()}
+               "fractional": FractionalStructure(),
+               "fractional_transfer_function": FractionalTransferFunctionStructure()}
 STRUCTURES = ("auto", *_STRUCTURES)
 
 
@@ -74,10 +79,12 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None):
     pair : Pair, str or Path
         A measured pair, or a bag with one on the default topics.
     axis : {"x", "y", "z"}
-    structure : {"auto", "arx", "oscillator", "fractional"}
+    structure : {"auto", "arx", "oscillator", "fractional", "fractional_transfer_function"}
         Rational transfer function in z, classical seismic sensor, one with a damping of free
-        order, or the choice between the last two: the fractional one only where its order differs
-        from 1 by three standard uncertainties and it predicts held-out data better.
+        order, or the general equation with two free orders on the left and, where the data call
+        for it, a slope term of free order on the right. ``auto`` chooses between classical and
+        fractional: the fractional one only where its order differs from 1 by three standard
+        uncertainties and it predicts held-out data better.
     provenance : dict, optional
         Where the data come from; becomes part of the model.
     progress : callable, optional
@@ -142,9 +149,21 @@ class _Candidate:
         require_excitation(data.reference, data.pair.sampling_rate_hz,
                            max(len(structure.names) + 2, FEWEST_COEFFICIENTS))
         data.progress(f"fitting the {name} structure")
-        fit = data.fit(structure)
+        structure, fit = _fitted(structure, data)
         data.progress(f"judging the {name} structure on held-out data")
         return cls(structure, name, fit, fit.rmse / data.spread, _held_out(structure, fit, data))
+
+
+def _fitted(structure, data):
+    """A structure and its fit, or the structure's extension where the data call for its terms."""
+    fit = data.fit(structure)
+    if isinstance(fit, Fit) and (extension := structure.extension(fit.unknowns)):
+        further, start = extension
+        extended = data.fit(further, start=start)
+        ratio = extended[further.decisive]
+        if abs(ratio) > _SIGNIFICANT * extended.std[extended.names.index(further.decisive)]:
+            return further, extended
+    return structure, fit
 
 
 def _choose(data):
@@ -196,8 +215,9 @@ def _unit(name):
     """Unit of a parameter, from the class that declares it."""
     if name[1:].isdigit():
         return {"a": "1", "b": unit_of(Oscillator, "sensitivity")}[name[0]]
-    return next(unit_of(cls, name) for cls in (Oscillator, TimeDelay, Offset)
-                if name in (field.name for field in parameter_fields(cls)))
+    # orders and ratios of the general equation belong to no class; they have no unit
+    return next((unit_of(cls, name) for cls in (Oscillator, TimeDelay, Offset)
+                 if name in (field.name for field in parameter_fields(cls))), "1")
 
 
 def _noise(residual):

@@ -18,10 +18,13 @@ _ITERATIONS = 60
 # A step this small against the standard uncertainties changes nothing that the data can tell.
 _SMALL_STEP = 1e-2
 _IMPROVEMENTS = 12
-_HIGHEST_DAMPING = 1e6
+# Damping of the search: enough to keep a singular system solvable, and what is as good as none.
+_LOWEST_DAMPING, _UNDAMPED, _HIGHEST_DAMPING = 1e-9, 1e-3, 1e6
 # Error of a start on the averaged response, over the best one's, with which it leads nowhere.
 _HOPELESS = 1.5
-# Logarithm of the amplitude below which a free motion is over.
+# Share of its first amplitude at which a free motion counts for as much as all else that is known
+# of it: that it was not much larger than the output.
+_FAINT = 1e-3
 _OVER = -20.0
 _START_LENGTH = 16384
 _TRIAL_ITERATIONS = 4
@@ -212,10 +215,11 @@ class _Problem:
         spectra = np.array([response, *slopes, response * (-self.convolution.s / self.rate)])
         spectra *= np.exp(-self.convolution.s * delay)
         simulated = self.convolution.response(spectra)[:, _WAY:][:, self.judged]
+        # one that is over long before the first used sample is none
         decays = [np.exp(-rate * self.instants)
-                  for rate in self.structure.decay_rates(own, self.instants[-1])]
+                  for rate in self.structure.decay_rates(own, self.instants[-1])
+                  if -rate * self.instants[0] > _OVER]
         pole, pole_slopes = self.structure.mode(own)
-        # a free motion that is over before the first used sample is none
         rings = pole is not None and pole.real * self.instants[0] > _OVER
         swing = np.exp(pole * self.instants) if rings else None
         free = [swing.real, swing.imag, *decays] if rings else decays
@@ -225,7 +229,7 @@ class _Problem:
     def search(self, theta, iterations):
         """Levenberg-Marquardt from `theta`; the last state."""
         state = self.state(np.clip(theta, self.low, self.high))
-        damping = 0.0
+        damping = _LOWEST_DAMPING
         for _ in range(iterations):
             inner, slope = state.reduced()
             diagonal = np.diag(np.diag(inner))
@@ -233,7 +237,7 @@ class _Problem:
             moved = False
             while damping < _HIGHEST_DAMPING:
                 step = self.step(state.theta, inner + damping * diagonal, slope)
-                if damping < 1e-3 and slope @ step < enough:
+                if damping < _UNDAMPED and slope @ step < enough:
                     return dataclasses.replace(state, converged=True)
                 new = self.state(np.clip(state.theta + step, self.low, self.high))
                 if new.cost < state.cost:
@@ -241,10 +245,10 @@ class _Problem:
                     break
                 if abs(slope @ step) < 1e-12 * state.cost:
                     break
-                damping = max(8 * damping, 1e-3)
+                damping = max(8 * damping, 1e-4)
             if not moved:
                 return dataclasses.replace(state, converged=True)
-            state, damping = new, damping / 10 if damping > 1e-9 else 0.0
+            state, damping = new, max(damping / 10, _LOWEST_DAMPING)
         return state
 
     def step(self, theta, matrix, slope):
@@ -253,7 +257,8 @@ class _Problem:
         while True:
             step = np.zeros(len(theta))
             step[free] = np.clip(_solve(matrix[np.ix_(free, free)], slope[free]), -1, 1)
-            stuck = free & (((theta <= self.low) & (step < 0)) | ((theta >= self.high) & (step > 0)))
+            outwards = np.where(step < 0, theta <= self.low, (theta >= self.high) & (step > 0))
+            stuck = free & outwards
             if not stuck.any():
                 return step
             free &= ~stuck
@@ -261,7 +266,9 @@ class _Problem:
     def state(self, theta):
         rows, count, swing, pole_slopes = self.rows(theta)
         known = rows[:count]
-        linear = _solve(known @ known.T, known @ self.sensor)
+        # what was over before the first used sample fades out of the fit instead of dropping out
+        faint = np.diag(np.r_[0.0, 0.0, np.full(count - 2, _FAINT**2)])
+        linear = _solve(known @ known.T + faint, known @ self.sensor)
         residual = self.sensor - linear @ known
         if swing is not None:
             # with the pole, what it left behind changes as well
@@ -269,7 +276,9 @@ class _Problem:
             rows[count:-1] += np.outer(pole_slopes.real, change.real)
             rows[count:-1] -= np.outer(pole_slopes.imag, change.imag)
         gram, right = rows @ rows.T, rows @ self.sensor
-        return _State(theta, float(residual @ residual), linear, rows, gram, right)
+        gram[:count, :count] += faint
+        cost = residual @ residual + linear @ faint @ linear
+        return _State(theta, float(cost), linear, rows, gram, right)
 
     def require_relation(self, explained):
         if explained < min(_CHANCE / self.independent(), 0.5):

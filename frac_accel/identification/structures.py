@@ -7,7 +7,7 @@ from ..core.principal_sheet import fractional_root
 
 _FREQUENCIES = 24
 _DAMPINGS = (0.02, 0.08, 0.25, 0.7, 1.5)
-_ORDERS = (0.3, 0.5, 0.7, 0.9, 1.1, 1.3, 1.5, 1.7)
+_ORDERS = (0.4, 0.7, 1.0, 1.3, 1.6)
 _INERTIA_ORDER = 1.95
 _SLOPE_RATIO, _SLOPE_ORDER = 0.05, 0.6
 
@@ -71,8 +71,12 @@ class OscillatorStructure:
         spread = np.sqrt(zeta**2 - 1)
         return omega * np.array([zeta - spread, zeta + spread])
 
+    def extension(self, unknowns):
+        """A structure with more terms and where to start, from a fit's unknowns; or None."""
+        return None
+
     def core(self, fit):
-        """Core of a sensor model."""
+        """Core of a sensor model, from anything that maps `names` and ``sensitivity`` to values."""
         return Oscillator(natural_frequency_hz=fit["natural_frequency_hz"],
                           damping_ratio=fit["damping_ratio"], sensitivity=fit["sensitivity"])
 
@@ -82,16 +86,16 @@ class FractionalStructure(OscillatorStructure):
 
     At its resonance, :math:`s = j \omega_0`, the damping term :math:`2 \zeta j^\nu` acts as a
     viscous damping ratio :math:`d = \zeta \sin(\nu \pi/2)` and as a spring of
-    :math:`k = 2 \zeta \cos(\nu \pi/2)` times the sensor's own. Data fix d and the frequency that the
-    spring leads to long before they fix the order; so the unknowns are the logarithms of
-    :math:`f_0 \sqrt{1 + k}` and of d, and the order. In :math:`f_0`, :math:`\zeta` and the order the
-    search would follow a curved valley.
+    :math:`k = 2 \zeta \cos(\nu \pi/2)` times the sensor's own. Data fix d and the frequency that
+    the spring leads to long before they fix the order; so the unknowns are the logarithms of
+    :math:`f_0 \sqrt[4]{1 + 2k + 2k^2}` (for small k :math:`f_0 \sqrt{1 + k}`) and of d, and the
+    order. In :math:`f_0`, :math:`\zeta` and the order the search would follow a curved valley.
     """
 
     names = ("natural_frequency_hz", "damping_ratio", "damping_order")
     held = ("damping_order",)
     starting_points = 3
-    trials = 6
+    trials = 4
     searches = 2
 
     def prepare(self, s):
@@ -199,6 +203,10 @@ class FractionalTransferFunctionStructure(FractionalStructure):
             denominator_orders=orders, numerator_coefficients=numerator,
             numerator_orders=numerator_orders)
 
+    def extension(self, unknowns):
+        return SlopedTransferFunctionStructure(), np.r_[unknowns[:-1], _SLOPE_RATIO, _SLOPE_ORDER,
+                                                        unknowns[-1]]
+
     def _numerator(self, fit, omega):
         return (fit["sensitivity"],), (0.0,)
 
@@ -208,6 +216,11 @@ class SlopedTransferFunctionStructure(FractionalTransferFunctionStructure):
 
     names = (*FractionalTransferFunctionStructure.names, "slope_ratio", "slope_order")
     held = (*FractionalTransferFunctionStructure.held, "slope_ratio", "slope_order")
+    # only where this differs from zero do the data call for the extension
+    decisive = "slope_ratio"
+
+    def extension(self, unknowns):
+        return None
 
     def gradient(self, prepared, theta):
         natural, factors = _natural(theta)
@@ -251,10 +264,12 @@ def _unknowns(log_f0, log_zeta, order):
 
 
 def _spring_shift(spring):
-    """Shift of the logarithm of the frequency and its slope; a straight line far below zero."""
-    inside = np.maximum(spring, -0.5)
-    by_spring = 0.5 / (1 + inside)
-    return 0.5 * np.log1p(inside) + by_spring * (spring - inside), by_spring
+    """Shift of the logarithm of the frequency, and its slope.
+
+    Half the logarithm of 1 + k where k is small, and without its end at k = -1.
+    """
+    square = 1 + 2 * spring * (1 + spring)
+    return 0.25 * np.log(square), (0.5 + spring) / square
 
 
 def _chain(slopes, factors):
