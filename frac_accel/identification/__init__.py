@@ -29,6 +29,8 @@ __all__ = ["STRUCTURES", "Identification", "identify"]
 _UNDETERMINED = 0.2
 # Standard uncertainties by which the damping order must differ from 1 to be called fractional.
 _SIGNIFICANT = 3.0
+# Likelihood ratio that two superfluous parameters reach in one of twenty records: chi-squared.
+_LIKELIHOOD_RATIO = 6.0
 _STRUCTURES = {"arx": ArxStructure(), "oscillator": OscillatorStructure(),
                "fractional": FractionalStructure(),
                "fractional_transfer_function": FractionalTransferFunctionStructure()}
@@ -155,14 +157,14 @@ class _Candidate:
 
 
 def _fitted(structure, data):
-    """A structure and its fit, or the structure's extension where the data call for its terms."""
+    """A structure and its fit, or a simpler one's where the likelihoods hardly differ."""
     fit = data.fit(structure)
-    if isinstance(fit, Fit) and (extension := structure.extension(fit.unknowns)):
-        further, start = extension
-        extended = data.fit(further, start=start)
-        ratio = extended[further.decisive]
-        if abs(ratio) > _SIGNIFICANT * extended.std[extended.names.index(further.decisive)]:
-            return further, extended
+    simpler = None if isinstance(fit, ArxFit) else structure.simpler(fit.unknowns)
+    if simpler:
+        other = data.fit(simpler[0], start=simpler[1])
+        ratio = 2 * np.isfinite(fit.residual).sum() * np.log(other.rmse / fit.rmse)
+        if ratio < _LIKELIHOOD_RATIO:
+            return simpler[0], other
     return structure, fit
 
 
@@ -280,6 +282,9 @@ def _seismic_notes(parameters, chosen, highest):
             size = f"{share:.0%} of" if share < 10 else "more than ten times"
             notes.append(f"{name} is not determined by these data (standard uncertainty {size} "
                          "its value)")
+        elif name != "sensitivity" and any(note.startswith("natural_f") for note in notes):
+            notes.append(f"{name} is not determined by these data (nor is the resonance that it "
+                         "describes)")
     resonance = parameters["natural_frequency_hz"]["value"]
     if highest < resonance / 3:
         notes.append(f"the excitation ends at {highest:.4g} Hz, far below the resonance at "

@@ -14,7 +14,7 @@ from .uncertainty import sandwich
 # Samples at both ends that the band-limited simulation cannot know, besides the unknown start.
 _EDGE = 32
 _WAY = 64
-_ITERATIONS = 60
+_ITERATIONS = 150
 # A step this small against the standard uncertainties changes nothing that the data can tell.
 _SMALL_STEP = 1e-2
 _IMPROVEMENTS = 12
@@ -26,8 +26,10 @@ _HOPELESS = 1.5
 # of it: that it was not much larger than the output.
 _FAINT = 1e-3
 _OVER = -20.0
+# Energy of a free motion, in variances of the noise, that noise alone may have.
+_SHOWN = 25.0
 _START_LENGTH = 16384
-_TRIAL_ITERATIONS = 4
+_TRIAL_ITERATIONS = 5
 # Share of the output's power, times the number of independent frequencies, that the best of all
 # resonances and delays still explains of an unrelated signal.
 _CHANCE = 10
@@ -256,7 +258,8 @@ class _Problem:
         free = np.ones(len(theta), bool)
         while True:
             step = np.zeros(len(theta))
-            step[free] = np.clip(_solve(matrix[np.ix_(free, free)], slope[free]), -1, 1)
+            step[free] = _solve(matrix[np.ix_(free, free)], slope[free])
+            step /= max(1, np.max(np.abs(step)))
             outwards = np.where(step < 0, theta <= self.low, (theta >= self.high) & (step > 0))
             stuck = free & outwards
             if not stuck.any():
@@ -271,8 +274,10 @@ class _Problem:
         linear = _solve(known @ known.T + faint, known @ self.sensor)
         residual = self.sensor - linear @ known
         if swing is not None:
-            # with the pole, what it left behind changes as well
-            change = (linear[2] - 1j * linear[3]) / linear[0] * self.instants * swing
+            # with the pole, what it left behind changes as well; what noise feigns of it does not
+            motion = linear[2:4] @ known[2:4]
+            shown = 1 / (1 + _SHOWN * (residual @ residual) / len(residual) / (motion @ motion))
+            change = shown * (linear[2] - 1j * linear[3]) / linear[0] * self.instants * swing
             rows[count:-1] += np.outer(pole_slopes.real, change.real)
             rows[count:-1] -= np.outer(pole_slopes.imag, change.imag)
         gram, right = rows @ rows.T, rows @ self.sensor

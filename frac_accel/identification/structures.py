@@ -71,8 +71,8 @@ class OscillatorStructure:
         spread = np.sqrt(zeta**2 - 1)
         return omega * np.array([zeta - spread, zeta + spread])
 
-    def extension(self, unknowns):
-        """A structure with more terms and where to start, from a fit's unknowns; or None."""
+    def simpler(self, unknowns):
+        """A structure with two parameters less, and where to start from `unknowns`; or None."""
         return None
 
     def core(self, fit):
@@ -155,7 +155,7 @@ class FractionalStructure(OscillatorStructure):
                           damping_order=fit["damping_order"])
 
 
-class FractionalTransferFunctionStructure(FractionalStructure):
+class PlainTransferFunctionStructure(FractionalStructure):
     r"""Equation (5) of the seed paper with three terms against one,
 
     .. math:: D^{\nu_2} y / \omega_0^{\nu_2} + 2 \zeta D^{\nu_1} y / \omega_0^{\nu_1} + y = S a.
@@ -203,24 +203,18 @@ class FractionalTransferFunctionStructure(FractionalStructure):
             denominator_orders=orders, numerator_coefficients=numerator,
             numerator_orders=numerator_orders)
 
-    def extension(self, unknowns):
-        return SlopedTransferFunctionStructure(), np.r_[unknowns[:-1], _SLOPE_RATIO, _SLOPE_ORDER,
-                                                        unknowns[-1]]
-
     def _numerator(self, fit, omega):
         return (fit["sensitivity"],), (0.0,)
 
 
-class SlopedTransferFunctionStructure(FractionalTransferFunctionStructure):
-    r"""The same with :math:`S (\beta D^\mu a / \omega_0^\mu + a)` on the right-hand side."""
+class FractionalTransferFunctionStructure(PlainTransferFunctionStructure):
+    r"""The same with a slope term, :math:`S (\beta D^\mu a / \omega_0^\mu + a)`, on the right."""
 
-    names = (*FractionalTransferFunctionStructure.names, "slope_ratio", "slope_order")
-    held = (*FractionalTransferFunctionStructure.held, "slope_ratio", "slope_order")
-    # only where this differs from zero do the data call for the extension
-    decisive = "slope_ratio"
+    names = (*PlainTransferFunctionStructure.names, "slope_ratio", "slope_order")
+    held = (*PlainTransferFunctionStructure.held, "slope_ratio", "slope_order")
 
-    def extension(self, unknowns):
-        return None
+    def simpler(self, unknowns):
+        return PlainTransferFunctionStructure(), np.delete(unknowns, [4, 5])
 
     def gradient(self, prepared, theta):
         natural, factors = _natural(theta)
