@@ -164,7 +164,8 @@ def unclipped_records():
             rng, RATE_HZ, 2.0, (5.0, 600.0), [1, 0.3, 0.05], (1.0, 0.0, 0.0)), step
 
 
-@pytest.mark.parametrize("name, excitation, step", list(unclipped_records()), ids=lambda x: str(x)[:20])
+@pytest.mark.parametrize("name, excitation, step", list(unclipped_records()),
+                         ids=lambda x: str(x)[:20])
 def test_quantised_crests_and_rests_are_not_clipped(name, excitation, step):
     _, reference, raw = measured(23, excitation)
     step = step * np.max(np.abs(raw.values[:, 0])) / 3
