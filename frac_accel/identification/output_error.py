@@ -18,6 +18,8 @@ _ITERATIONS = 150
 # A step this small against the standard uncertainties changes nothing that the data can tell.
 _SMALL_STEP = 1e-2
 _IMPROVEMENTS = 12
+# Steps after which a search that goes on is in a curved valley, and how far it looks ahead there.
+_STRAIGHT, _AHEAD = 8, 0.1
 # Damping of the search: enough to keep a singular system solvable, and what is as good as none.
 _LOWEST_DAMPING, _UNDAMPED, _HIGHEST_DAMPING = 1e-9, 1e-3, 1e6
 # Error of a start on the averaged response, over the best one's, with which it leads nowhere.
@@ -234,7 +236,7 @@ class _Problem:
         """Levenberg-Marquardt from `theta`; the last state."""
         state = self.state(np.clip(theta, self.low, self.high))
         damping = _LOWEST_DAMPING
-        for _ in range(iterations):
+        for iteration in range(iterations):
             inner, slope = state.reduced()
             diagonal = np.diag(np.diag(inner))
             enough = _SMALL_STEP**2 * state.cost / len(self.sensor)
@@ -243,6 +245,8 @@ class _Problem:
                 step = self.step(state.theta, inner + damping * diagonal, slope)
                 if damping < _UNDAMPED and slope @ step < enough:
                     return dataclasses.replace(state, converged=True)
+                if iteration >= _STRAIGHT:
+                    step += self.bend(state, step, inner + damping * diagonal)
                 new = self.state(np.clip(state.theta + step, self.low, self.high))
                 if new.cost < state.cost:
                     moved = True
@@ -268,6 +272,26 @@ class _Problem:
                 return step
             free &= ~stuck
 
+    def bend(self, state, step, matrix):
+        """What the residual's curvature along a step adds to it; zero where it is no small part.
+
+        Geodesic acceleration for narrow curved valleys (M. Transtrum, J. Sethna,
+        arXiv:1201.5885).
+        """
+        ahead = self.state(np.clip(state.theta + _AHEAD * step, self.low, self.high))
+        count = len(state.linear)
+        slopes = state.linear[0] * state.rows[count:]
+        known = state.rows[:count]
+        gram = state.gram[:count, :count]
+        straight = step @ slopes
+        straight -= _solve(gram, known @ straight) @ known
+        curved = 2 / _AHEAD * ((ahead.residual - state.residual) / _AHEAD + straight)
+        curved -= _solve(gram, known @ curved) @ known
+        scale = np.sqrt(np.diag(matrix))
+        bend = np.where(step == 0, 0.0, 0.5 * _solve(matrix, slopes @ curved))
+        small = np.linalg.norm(scale * bend) < 0.75 * np.linalg.norm(scale * step)
+        return bend if small else np.zeros(len(step))
+
     def state(self, theta):
         rows, count, swing, pole_slopes = self.rows(theta)
         known = rows[:count]
@@ -285,7 +309,7 @@ class _Problem:
         gram, right = rows @ rows.T, rows @ self.sensor
         gram[:count, :count] += faint
         cost = residual @ residual + linear @ faint @ linear
-        return _State(theta, float(cost), linear, rows, gram, right)
+        return _State(theta, float(cost), linear, rows, residual, gram, right)
 
     def require_relation(self, explained):
         if explained < min(_CHANCE / self.independent(), 0.5):
@@ -303,7 +327,6 @@ class _Problem:
     def result(self, state, uncertainty=True):
         """The fit in physical units; without `uncertainty` its covariance is NaN."""
         theta, linear, count = state.theta, state.linear, len(state.linear)
-        residual = self.sensor - linear @ state.rows[:count]
         own, factors = self.structure.physical(theta[:-1])
         names = ("sensitivity", *self.structure.names, "delay_s", "offset")
         covariance = np.full((len(names), len(names)), np.nan)
@@ -316,9 +339,10 @@ class _Problem:
             jacobian[-1] *= self.rate
             # sensitivity, structure, delay, offset, free motions
             order = [0, *range(count, len(jacobian)), *range(1, count)]
-            covariance = sandwich(jacobian[order].T, residual, self.used)[:len(names), :len(names)]
+            covariance = sandwich(jacobian[order].T, state.residual, self.used)
+            covariance = covariance[:len(names), :len(names)]
         full = np.full(self.n, np.nan)
-        full[self.used] = residual
+        full[self.used] = state.residual
         offset = linear[1] - linear[0] * self.level
         values = np.r_[linear[0], own, theta[-1] / self.rate, offset]
         return Fit(names, values, covariance, full, theta)
@@ -332,6 +356,7 @@ class _State:
     cost: float
     linear: np.ndarray
     rows: np.ndarray
+    residual: np.ndarray
     gram: np.ndarray
     right: np.ndarray
     converged: bool = False

@@ -8,7 +8,7 @@ from ..core.principal_sheet import fractional_root
 _FREQUENCIES = 24
 _DAMPINGS = (0.02, 0.08, 0.25, 0.7, 1.5)
 _ORDERS = (0.4, 0.7, 1.0, 1.3, 1.6)
-_INERTIA_ORDER = 1.95
+_INERTIA_ORDER, _HIGHEST_DAMPING_ORDER = 1.95, 1.45
 _SLOPE_RATIO, _SLOPE_ORDER = 0.05, 0.6
 
 
@@ -184,10 +184,12 @@ class PlainTransferFunctionStructure(FractionalStructure):
 
     def bounds(self, rate, n):
         low, high = super().bounds(rate, n)
-        return [*low, 1.2], [*high, 2.0]
+        # two terms of nearly equal order are one, and could change places
+        return [*low, _HIGHEST_DAMPING_ORDER + 0.05], [*high[:2], _HIGHEST_DAMPING_ORDER, 2.0]
 
     def grid(self, low_hz, high_hz, peak_hz):
         grid = super().grid(low_hz, high_hz, peak_hz)
+        grid = grid[grid[:, 2] < _HIGHEST_DAMPING_ORDER]
         return np.c_[grid, np.full(len(grid), _INERTIA_ORDER)]
 
     def mode(self, theta):
