@@ -127,9 +127,9 @@ class _Problem:
         self.all_used = slice(min(_EDGE, self.n // 8), self.n - min(_EDGE, self.n // 8)) \
             if used.sum() == self.n - 2 * min(_EDGE, self.n // 8) else used
         self.sensor = sensor[self.all_used]
-        if np.ptp(self.sensor) == 0:
-            raise IdentificationError("the sensor's output is constant where it counts")
         self.size = float(np.std(self.sensor))
+        if self.size**2 == 0:
+            raise IdentificationError("the sensor's output is constant where it counts")
         self.reference = reference
         self.whole = sensor
 
