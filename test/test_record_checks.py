@@ -2,10 +2,12 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 import rig
+from random_models import draw_sensor
 
 from frac_accel import identify, write_bag
 from frac_accel.bag import RAW_TOPIC, REFERENCE_TOPIC
@@ -16,9 +18,11 @@ from frac_accel.pair import make_pair
 from frac_accel.samples import Samples
 
 RATE_HZ = 2000.0
+X_ONLY = (1.0, 0.0, 0.0)
+BAGS = Path(__file__).parents[1] / "bags"
 
 
-def measured(seed, excitation=None, snr_db=40.0, samples=4000, amplitude=(1.0, 0.0, 0.0), **draw):
+def measured(seed, excitation=None, snr_db=40.0, samples=4000, amplitude=X_ONLY, **draw):
     """A random classical sensor with a delay, and its record."""
     rng = np.random.default_rng([20261201, seed])
     draw = {"natural_frequency": (0.05, 0.2), "damping_ratio": (0.05, 0.7), **draw}
@@ -76,7 +80,7 @@ def test_copy_of_the_reference(copied, tmp_path, capsys):
 def test_sensor_far_below_its_resonance_is_no_copy():
     """60 dB, quantised to a hundredth of its standard deviation, and hardly any dynamics."""
     rng = np.random.default_rng(20261202)
-    excitation = rig.band_noise(rng, RATE_HZ, 2.0, (1.0, 20.0), (1.0, 0.0, 0.0), lead_s=0.3)
+    excitation = rig.band_noise(rng, RATE_HZ, 2.0, (1.0, 20.0), X_ONLY, lead_s=0.3)
     _, reference, sensor = measured(1, excitation, snr_db=60.0, natural_frequency=(0.3, 0.3))
     for step in (0.0, 0.003, 0.02):
         x = sensor.values[:, 0]
@@ -91,6 +95,8 @@ def test_axes_in_proportion_are_noted():
     assert any("axes x, y and z do not move independently" in note for note in result.notes)
     _, reference, sensor = measured(2, amplitude=(1.0, 0.7, 1.5))
     assert not any("axes" in note for note in run(reference, sensor).notes)
+    repeated = Samples.of(sensor.stamps_ns, sensor.values[:, [0, 1, 0]])
+    assert any("sensor's axes x and z depend" in note for note in run(reference, repeated).notes)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -108,6 +114,34 @@ def test_exchanged_topics_are_seen_by_all_structures():
     for structure in ("auto", "arx"):
         with pytest.raises(IdentificationError, match="are exchanged"):
             identify(make_pair(raw, reference), structure=structure)
+
+
+def test_random_sensors_the_right_way_round_are_not_refused():
+    """Of all kinds, with lags of the stamps and quantised reference and output in half of them."""
+    rng = np.random.default_rng(20261206)
+    for draw in range(12):
+        sensor = draw_sensor(rng, RATE_HZ, natural_frequency=(0.01, 0.4))
+        band = (5.0, RATE_HZ * rng.uniform(0.03, 0.45))
+        excitation = rig.shock(RATE_HZ, 1.0, 1 / (4 * band[1]), amplitude=X_ONLY) if draw % 3 == 0 \
+            else rig.band_noise(rng, RATE_HZ, 1.0, band, X_ONLY, lead_s=0.3)
+        record = rig.simulate_record(sensor, excitation, rng, snr_db=rng.uniform(20, 60))
+        reference = Samples.of(record.stamps_ns, record.reference)
+        late_ns = int(rng.uniform(-3, 3) * 1e9 / RATE_HZ)
+        raw = Samples.of(record.sensor_stamps_ns + late_ns, record.sensor)
+        if draw % 2:
+            reference, raw = (
+                with_x(s, np.round(s.values[:, 0] / step) * step) for s, step in
+                ((s, s.values[:, 0].std() * rng.uniform(0.01, 0.3)) for s in (reference, raw)))
+        check = run(reference, raw).excitation
+        assert (check.clipped, check.standing) == (0, 0)
+
+
+def test_one_sine_is_told_where_more_is_needed(tmp_path, capsys):
+    assert main(["identify", str(BAGS / "one_sine.mcap"), "-o", str(tmp_path / "m.yaml")]) == 2
+    line, = capsys.readouterr().err.strip().splitlines()
+    assert "excites only 300 Hz" in line and "at least 2 frequencies" in line
+    assert "from 10 to 400 Hz, besides 300 Hz for instance 10 Hz" in line
+    assert not (tmp_path / "m.yaml").exists()
 
 
 def test_early_stamps_are_noted_and_not_refused():
@@ -150,27 +184,23 @@ def test_clipped_reference(tmp_path, capsys):
     assert "the reference is clipped at -1.5 and 1.8 in" in line
 
 
-def unclipped_records():
-    rng = np.random.default_rng(20261203)
-    for step in (0.02, 0.1, 0.3):
-        yield f"noise, step {step}", None, step
-        yield (f"sweep, step {step}",
-               rig.swept_sine(RATE_HZ, 2.0, (2.0, 60.0), (1.0, 0.0, 0.0)), step)
-        yield (f"two sines, step {step}", rig.sines(RATE_HZ, 2.0, [2.0, 50.0], [0.0, 1.0],
-                                                    (1.0, 0.0, 0.0), lead_s=0.3), step)
-        yield f"shock at rest, step {step}", rig.shock(RATE_HZ, 2.0, 1e-3,
-                                                       amplitude=(1.0, 0.0, 0.0)), step
-        yield f"bursts, step {step}", rig.noise_bursts(
-            rng, RATE_HZ, 2.0, (5.0, 600.0), [1, 0.3, 0.05], (1.0, 0.0, 0.0)), step
+UNCLIPPED = {
+    "noise": lambda rng: rig.band_noise(rng, RATE_HZ, 2.0, (5.0, 600.0), X_ONLY, lead_s=0.3),
+    "sweep": lambda rng: rig.swept_sine(RATE_HZ, 2.0, (2.0, 60.0), X_ONLY),
+    "two sines": lambda rng: rig.sines(RATE_HZ, 2.0, [2.0, 50.0], [0.0, 1.0], X_ONLY, lead_s=0.3),
+    "shock": lambda rng: rig.shock(RATE_HZ, 2.0, 1e-3, amplitude=X_ONLY),
+    "bursts": lambda rng: rig.noise_bursts(rng, RATE_HZ, 2.0, (5.0, 600.0), [1, 0.3, 0.05], X_ONLY),
+}
 
 
-@pytest.mark.parametrize("name, excitation, step", list(unclipped_records()),
-                         ids=lambda x: str(x)[:20])
-def test_quantised_crests_and_rests_are_not_clipped(name, excitation, step):
-    _, reference, raw = measured(23, excitation)
-    step = step * np.max(np.abs(raw.values[:, 0])) / 3
-    check = run(reference, with_x(raw, np.round(raw.values[:, 0] / step) * step)).excitation
-    assert (check.clipped, check.standing) == (0, 0), name
+@pytest.mark.parametrize("kind", UNCLIPPED)
+def test_quantised_crests_and_rests_are_not_clipped(kind):
+    _, reference, raw = measured(23, UNCLIPPED[kind](np.random.default_rng(20261203)))
+    x = raw.values[:, 0]
+    for share in (0.007, 0.03, 0.1):
+        step = share * np.max(np.abs(x))
+        check = run(reference, with_x(raw, np.round(x / step) * step)).excitation
+        assert (check.clipped, check.standing) == (0, 0), share
 
 
 def test_sensor_unplugged_half_way():
@@ -203,7 +233,7 @@ def test_reference_lost_in_mid_run(lost):
 
 
 def test_ringing_after_the_reference_has_come_to_rest_counts():
-    sensor, reference, raw = measured(33, rig.shock(RATE_HZ, 1.0, 1e-3, amplitude=(1.0, 0.0, 0.0)),
+    sensor, reference, raw = measured(33, rig.shock(RATE_HZ, 1.0, 1e-3, amplitude=X_ONLY),
                                       damping_ratio=(0.01, 0.01))
     assert np.sum(reference.values[:, 0] == 0) > 500
     result = run(reference, raw)
@@ -238,7 +268,7 @@ def test_delay_of_much_of_the_record(share, tmp_path, capsys):
 def test_parameters_that_are_only_determined_together():
     """Far below the resonance, delay and damping are one slope of the phase."""
     rng = np.random.default_rng(20261204)
-    excitation = rig.band_noise(rng, RATE_HZ, 2.0, (5.0, 60.0), (1.0, 0.0, 0.0), lead_s=0.3)
+    excitation = rig.band_noise(rng, RATE_HZ, 2.0, (5.0, 60.0), X_ONLY, lead_s=0.3)
     _, reference, raw = measured(50, excitation, snr_db=40, natural_frequency=(0.15, 0.15))
     note, = (note for note in run(reference, raw).notes if "only determined together" in note)
     assert "damping_ratio" in note and "delay_s" in note and "excitation from 6" in note

@@ -123,7 +123,8 @@ def _collinear(pair):
         return [f"the reference's axes {together} do not move independently of each other: "
                 "cross-axis sensitivity cannot be told from these data"]
     together = _dependent(pair.sensor[pair.valid])
-    if together:
+    # axes that all answer to the only one that moves are no wonder
+    if together and len(_excited(pair.reference[pair.valid])) == len(AXES):
         return [f"the sensor's axes {together} depend on each other although the reference's do "
                 "not: they are no outputs of separate axes"]
     return []
@@ -131,8 +132,7 @@ def _collinear(pair):
 
 def _dependent(values):
     """Names of axes that are a linear combination of each other; empty if there are none."""
-    spread = np.std(values, axis=0)
-    excited = np.flatnonzero(spread > 1e-6 * spread.max())
+    excited = _excited(values)
     if len(excited) < 2:
         return ""
     strength, direction = np.linalg.eigh(np.corrcoef(values[:, excited].T))
@@ -140,6 +140,11 @@ def _dependent(values):
         return ""
     dependent = np.any(np.abs(direction[:, strength <= _COLLINEAR]) > 0.1, axis=1)
     return _listed([AXES[i] for i in excited[dependent]])
+
+
+def _excited(values):
+    spread = np.std(values, axis=0)
+    return np.flatnonzero(spread > 1e-6 * spread.max())
 
 
 def _moving(reference, sensor, pair):
