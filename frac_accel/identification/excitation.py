@@ -119,6 +119,12 @@ def excited_band(reference, sensor, sampling_rate_hz):
     return float(low), float(frequency[most[-1]])
 
 
+def highest_excited(reference):
+    """Highest frequency at which the reference has power [of the sampling rate]."""
+    frequency, power = _spectrum(reference, 1.0)
+    return frequency[np.flatnonzero(power > _FLOOR * power.max())[-1]]
+
+
 def persistent_excitation(reference, sampling_rate_hz):
     """Order of persistent excitation and the lines that give it.
 
