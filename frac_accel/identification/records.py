@@ -36,7 +36,8 @@ class Combination:
     covariance : ndarray, shape (p, p)
         Multiplied by the square of `birge_factor`.
     statistic, p_value : float
-        Chi-squared of `freedom` degrees of freedom, over the parameters that should agree.
+        Chi-squared of `freedom` degrees of freedom, over the parameters that should agree and
+        that no fit leaves open.
     freedom : int
     birge_factor : float
         :math:`\sqrt{\chi^2 / \mathrm{freedom}}` where the fits disagree, otherwise 1 (R. T. Birge,
@@ -142,7 +143,11 @@ def combine(fits):
     """
     names = fits[0].names
     estimated = np.all([fit.std > 0 for fit in fits], axis=0)
-    shared = estimated & [name not in _OWN_TO_EACH_RECORD for name in names]
+    # far from linear: such a covariance would call records of one sensor different
+    is_open = np.array([name in _POSITIVE and any(fit.std[i] > _OPEN * fit.values[i]
+                                                  for fit in fits)
+                        for i, name in enumerate(names)])
+    shared = estimated & ~is_open & [name not in _OWN_TO_EACH_RECORD for name in names]
     free = [_unbounded(names, fit.values) for fit in fits]
     points = [point for point, _ in free]
     spreads = [fit.covariance * np.outer(slope, slope) for fit, (_, slope) in zip(fits, free)]
@@ -155,9 +160,8 @@ def combine(fits):
     birge = float(np.sqrt(statistic / freedom)) if disagree else 1.0
     mean, spread = points[0].copy(), np.zeros_like(spreads[0])
     place = np.ix_(estimated, estimated)
-    is_open = any(fit.std[i] > _OPEN * fit.values[i] for fit in fits
-                  for i, name in enumerate(names) if name in _POSITIVE)
-    mean[estimated], spread[place] = (_separate_means if disagree or is_open else _weighted_mean)(
+    mean_of = _separate_means if disagree or is_open.any() else _weighted_mean
+    mean[estimated], spread[place] = mean_of(
         [point[estimated] for point in points], [matrix[place] for matrix in spreads])
     values, slope = _bounded(names, mean)
     covariance = spread * np.outer(slope, slope)
