@@ -17,7 +17,7 @@ _WAY = 64
 _ITERATIONS = 150
 # A step this small against the standard uncertainties changes nothing that the data can tell.
 _SMALL_STEP = 1e-2
-_IMPROVEMENTS = 12
+_IMPROVEMENTS = 8
 # Steps after which a search that goes on is in a curved valley, and how far it looks ahead there.
 _STRAIGHT, _AHEAD = 8, 0.1
 # Damping of the search: enough to keep a singular system solvable, and what is as good as none.
