@@ -87,7 +87,11 @@ class _Way:
 
 
 def exchanged_instead(reference, sensor, pair):
-    """Error of a pair without a model whose topics, exchanged, have one; None if they have not.
+    """Error of two topics that are exchanged, or None.
+
+    Classical sensors are fitted in both directions. A sensor answers later than the reference, and
+    has a resonance; the other way round it would answer before it and have an antiresonance, which
+    no delay and no damping makes up for. Below the resonance both directions look alike.
 
     Parameters
     ----------
@@ -98,18 +102,11 @@ def exchanged_instead(reference, sensor, pair):
     -------
     IdentificationError or None
     """
-    backward = _Way.of(sensor, reference, pair, -pair.lag_s)
-    if backward is None or not backward.determined or backward.unexplained > _ALONE:
-        return None
-    return _error("no sensor answers like this", backward)
+    return _exchanged(_Way.of(reference, sensor, pair, pair.lag_s), reference, sensor, pair)
 
 
 def judge_direction(fit, reference, sensor, pair):
-    """Refuse exchanged topics, by classical sensors fitted in both directions.
-
-    A sensor answers later than the reference, and has a resonance; the other way round it would
-    answer before it and have an antiresonance, which no delay and no damping makes up for. Below
-    the resonance both directions look alike: then there is a note at most.
+    """Refuse exchanged topics (`exchanged_instead`); where that is open, there is a note at most.
 
     Parameters
     ----------
@@ -134,22 +131,30 @@ def judge_direction(fit, reference, sensor, pair):
     if not early and fit.rmse < _LACKING * white_noise(fit.residual):
         return []
     forward = _Way.of(reference, sensor, pair, pair.lag_s)
-    if forward is None:
-        error = exchanged_instead(reference, sensor, pair)
-        if error is not None:
-            raise error
-        return []
-    if forward.fit.rmse > _LACKING * white_noise(forward.fit.residual):
-        backward = _Way.of(sensor, reference, pair, -pair.lag_s)
-        if backward is not None and backward.is_sensor:
-            ratio = backward.unexplained / forward.unexplained
-            if ratio < _SHAPE or (ratio < _SHAPE_AND_DELAY and forward.early and backward.causal):
-                raise _error("the best sensor leaves "
-                             f"{forward.unexplained:.2%} of the output unexplained", backward)
-    if forward.early and forward.lead_s > _NOTED * forward.sample_s:
+    error = _exchanged(forward, reference, sensor, pair)
+    if error is not None:
+        raise error
+    if forward is not None and forward.early and forward.lead_s > _NOTED * forward.sample_s:
         return [f"the sensor answers {forward.lead_s:.3g} s before the reference moves: its stamps "
                 "are early by that much, it is AC-coupled, or reference and sensor are exchanged"]
     return []
+
+
+def _exchanged(forward, reference, sensor, pair):
+    if forward is not None and forward.fit.rmse < _LACKING * white_noise(forward.fit.residual):
+        return None
+    backward = _Way.of(sensor, reference, pair, -pair.lag_s)
+    if backward is None or not backward.determined:
+        return None
+    if forward is None:
+        return _error("no sensor answers like this", backward) \
+            if backward.unexplained < _ALONE else None
+    ratio = backward.unexplained / forward.unexplained
+    decisive = ratio < _SHAPE or (ratio < _SHAPE_AND_DELAY and forward.early and backward.causal)
+    if not backward.is_sensor or not decisive:
+        return None
+    return _error(f"the best sensor leaves {forward.unexplained:.2%} of the output unexplained",
+                  backward)
 
 
 def _error(words, backward):

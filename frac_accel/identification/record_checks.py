@@ -22,6 +22,7 @@ _COLLINEAR = 1e-4
 # Equal samples in a row that make a standstill, and the other topic's motion meanwhile: of its
 # usual motion, and in steps of the one that stands still.
 _STANDSTILL = 32
+_BESIDE = 128
 _MOVING = 0.5
 _STEPS = 3
 # A reference may rest while the sensor rings: it is lost where it jumps to its standstill or from
@@ -181,15 +182,27 @@ def _standstills(values, other, valid):
         return []
     usual = np.std(other[places])
     step = lattice_step(values[places])
-    gain = np.std(values[places]) / usual
     extremes = values[places].min(), values[places].max()
     runs = [(int(places[edges[i]]), int(places[edges[i + 1] - 1]) + 1) for i in long]
-    runs = [(start, stop) for start, stop in runs
-            if (motion := np.std(other[start:stop])) > _MOVING * usual
-            and gain * motion > _STEPS * step]
+    runs = [run for run in runs if (motion := _motion(other[slice(*run)])) > _MOVING * usual
+            and _gain_beside(values, other, *run) * motion > _STEPS * step]
     # what comes to the same extreme again and again is clipped
     at = [values[start] for start, _ in runs]
     return [run for run, value in zip(runs, at) if value not in extremes or at.count(value) == 1]
+
+
+def _motion(values):
+    """Standard deviation, by the median: a shock's onset at the end is no motion all along."""
+    return 1.4826 * np.median(np.abs(values - np.median(values)))
+
+
+def _gain_beside(values, other, start, stop):
+    """Ratio of the motions before a run, or after it: a swept sensor answers less and less."""
+    before = slice(max(start - _BESIDE, 0), start)
+    after = slice(stop, stop + _BESIDE)
+    window = before if start >= _STANDSTILL else after
+    motion = np.std(other[window]) if len(other[window]) else 0.0
+    return np.std(values[window]) / motion if motion > 0 else 0.0
 
 
 def _off_its_rest(values, run, valid):
