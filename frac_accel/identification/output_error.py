@@ -28,8 +28,9 @@ _HOPELESS = 1.5
 # of it: that it was not much larger than the output.
 _FAINT = 1e-3
 _OVER = -20.0
-# Energy of a free motion, in variances of the noise, that noise alone may have.
-_SHOWN = 25.0
+# Energy, in variances of the noise, of a free motion that noise alone may show: the largest of a
+# spectrum of 1e5 lines has 23.
+_FEIGNED = 50.0
 _START_LENGTH = 16384
 _TRIAL_ITERATIONS = 5
 # Share of the output's power, times the number of independent frequencies, that the best of all
@@ -302,7 +303,8 @@ class _Problem:
         if swing is not None:
             # with the pole, what it left behind changes as well; what noise feigns of it does not
             motion = linear[2:4] @ known[2:4]
-            shown = 1 / (1 + _SHOWN * (residual @ residual) / len(residual) / (motion @ motion))
+            feigned = _FEIGNED * (residual @ residual) / len(residual)
+            shown = 1 / (1 + (feigned / max(motion @ motion, 1e-300))**2)
             change = shown * (linear[2] - 1j * linear[3]) / linear[0] * self.instants * swing
             rows[count:-1] += np.outer(pole_slopes.real, change.real)
             rows[count:-1] -= np.outer(pole_slopes.imag, change.imag)
