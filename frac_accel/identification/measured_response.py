@@ -61,7 +61,8 @@ class MeasuredResponse:
         if not self._suits(structure):
             return None, []
         try:
-            other = fit_response(structure, self.points, self.sampling_rate_hz, fit["delay_s"])
+            other = fit_response(structure, self.points, self.sampling_rate_hz, fit["delay_s"],
+                                 fit.unknowns)
         except IdentificationError as error:
             return None, [f"no frequency-domain fit: {error}"]
         compared = compare_domains(fit, other)
