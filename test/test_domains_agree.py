@@ -34,7 +34,7 @@ def test_both_domains_agree_and_are_right(kind):
         record = rig.simulate_record(sensor, EXCITATIONS[kind](rng))
         pair = pair_of(record, noisy(record, rng, rng.uniform(30, 60), rng.choice([0.0, 0.9])))
         result = identify(pair, structure="oscillator")
-        assert result.excitation["kind"] == kind
+        assert result.excitation.kind == kind
         other = result.frequency_domain
         assert other["agrees"], other["words"]
         for found in (result.parameters, other["parameters"]):

@@ -206,6 +206,18 @@ def test_missing_samples_do_not_count():
     assert any("have no sample" in note for note in result.notes)
 
 
+def test_no_pole_rings_where_nothing_excites_it():
+    """It would live on its initial values alone, and ring in every simulation of the model."""
+    rng = np.random.default_rng(0)
+    for noise_ar in ((), (0.9,)) * 3:
+        _, record = measured(rng, "arx", 40.0, noise_ar, ["time_delay"])
+        result = identify(pair_of(record), structure="arx")
+        assert result.held_out_nrmse < 1.5 * result.nrmse
+        poles = np.roots(result.model.core.denominator)
+        above = np.abs(np.angle(poles)) > 2 * np.pi * 720.0 / RATE_HZ
+        assert np.all(np.abs(poles[above]) < 0.999)
+
+
 def test_corrected_record_is_the_motion():
     rng = np.random.default_rng(40269)
     for kind in ("arx", "classical"):

@@ -41,6 +41,10 @@ def test_page_tells_what_was_found(tmp_path, structure):
         assert re.search(rf"<td[^>]*>{name}</td><td[^>]*>{re.escape(value)}</td>"
                          rf"<td[^>]*>{re.escape(std or '–')}</td>", text)
     assert found["reason"] in text
+    tests, excited = found["validation"]["residual"], found["excitation"]
+    assert f"{tests['independence_statistic']:.1f}" in text
+    assert f"{excited['crest_factor']:.3g}" in text and f"{excited['loudest_rms']:.4g}" in text
+    assert all(f"{band['nrmse']:.2%}" in text for band in found["validation"]["held_out_bands"])
     known = response_uncertainty(SensorModel.load(files["m.yaml"]), [10.0, 200.0], "y")
     band = next(trace for trace in traces(text) if trace["name"] == "95 % interval")
     # the outline: along the upper limit, and back along the lower one

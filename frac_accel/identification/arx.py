@@ -8,7 +8,12 @@ from scipy.signal import lfilter
 from ..core import Arx
 from ..errors import IdentificationError
 from .continuous_poles import METHOD, continuous_poles
-from .excitation import alternating_stretches, persistent_excitation, strongest_stretch
+from .excitation import (
+    alternating_stretches,
+    highest_excited,
+    persistent_excitation,
+    strongest_stretch,
+)
 from .frequency_response import bulk_delay
 from .output_error import Fit
 from .uncertainty import sandwich
@@ -40,6 +45,8 @@ _BLOCKS = 32
 _STRETCHES = 16
 # BIC above the best so far from which a model of that size is not fitted: odds of exp(10).
 _HOPELESS = 20.0
+# Time constants in a record, at least, of a pole above all excited frequencies.
+_SHORT = 30.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -174,8 +181,8 @@ def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=No
     valid = np.ones(len(sensor), bool) if valid is None else valid
     if start is None:
         most = persistent_excitation(reference, sampling_rate_hz)[0]
-        part = strongest_stretch(reference, _CHOICE_LENGTH)
-        start = _widened(*_choose(reference[part], sensor[part], valid[part], most), most)
+        part = strongest_stretch(reference, _CHOICE_LENGTH, valid)
+        start = _choose(reference[part], sensor[part], valid[part], most)
     orders, coefficients = start
     record = _Record(reference, sensor, valid, orders)
     problem = record.problem(orders)
@@ -203,7 +210,7 @@ def _choose(reference, sensor, valid, most):
     if len(sensor) < 20 * (MOST_POLES + MOST_ZEROS):
         raise IdentificationError(f"the record has {len(sensor)} samples, expected at least "
                                   f"{20 * (MOST_POLES + MOST_ZEROS)} to choose orders on")
-    most = min(most, MOST_POLES + MOST_ZEROS + 1)
+    largest = min(most, MOST_POLES + MOST_ZEROS + 1)
     bulk = bulk_delay(reference, sensor)
     reach = min(_LONG_INPUTS, len(sensor) // 20)
     window = Orders(0, 0, bulk - reach), Orders(_LONG_POLES, 2 * reach, bulk - reach)
@@ -212,17 +219,21 @@ def _choose(reference, sensor, valid, most):
     long = record.problem(window[1], record.learn)
     long_output = long.simulate(long.stable(long.least_squares()))[0]
 
-    inputs = min(MOST_ZEROS + 1, most - 1)
-    poles = min(MOST_POLES, most - inputs)
+    inputs = min(MOST_ZEROS + 1, largest - 1)
+    poles = min(MOST_POLES, largest - inputs)
     scanned = [_Trial.of(record, Orders(poles, inputs, delay), long_output, _SCAN_ITERATIONS)
                for delay in range(bulk - reach, bulk + 3)]
     # the first coefficients may be nought: of the delays that do equally well, the longest
     enough = min(trial.bic for trial in scanned) + np.log(record.rows)
     earliest = max(trial.orders.delay for trial in scanned if trial.bic <= enough)
+    return _widened(_best(_trials(record, long_output, earliest, largest), record), most)
+
+
+def _best(trials, record):
+    """Largest of the models that each improve on a smaller one."""
     constant = _Trial(Orders(0, 0, 0), np.zeros(0), np.inf, np.inf, np.inf, record.centred())
     best = constant
-    for trial in sorted(_trials(record, long_output, earliest, most),
-                        key=lambda trial: (trial.orders.coefficients, trial.overall)):
+    for trial in sorted(trials, key=lambda trial: (trial.orders.coefficients, trial.overall)):
         larger = trial.orders.coefficients > best.orders.coefficients
         if larger and trial.bic < best.bic and record.gain(trial.error, best.error) > _BETTER:
             best = trial
@@ -231,7 +242,7 @@ def _choose(reference, sensor, valid, most):
             f"no transfer function of up to {MOST_POLES} poles predicts held-out stretches of the "
             "record better than a constant does: the sensor's output has nothing to do with the "
             "reference")
-    return best.orders, best.theta[:best.orders.coefficients]
+    return best
 
 
 def _trials(record, long_output, earliest, most):
@@ -256,14 +267,15 @@ def _trials(record, long_output, earliest, most):
     return trials
 
 
-def _widened(orders, coefficients, most):
-    """The chosen model with one more numerator coefficient before the first and after the last.
+def _widened(trial, most):
+    """The chosen model's orders and coefficients, its numerator wider by one at either end.
 
     A choice of orders tolerates a bias as large as the standard errors, so that intervals given
     these orders cover too little. One step beyond the chosen the bias is small against them
     ("undersmoothing": P. Hall, *Ann. Statist.* 20 (1992) 675-694). More poles would not do: where
     they are too many, zeros cancel them and neither is determined.
     """
+    orders, coefficients = trial.orders, trial.theta[:trial.orders.coefficients]
     if orders.coefficients + 2 > most:
         return orders, coefficients
     a, b = np.split(coefficients, [orders.poles])
@@ -313,13 +325,14 @@ class _Record:
         self.level, self.mean = reference.mean(), sensor[kept][self.valid].mean()
         self.all = reference - self.level
         self.reference, self.sensor = self.all[kept], sensor[kept] - self.mean
+        self.highest = 2 * np.pi * highest_excited(reference)
 
     def problem(self, orders, used=True):
         inputs = np.ones((orders.inputs + 1, self.rows))
         for i in range(orders.inputs):
             begin = self.first - orders.delay - i
             inputs[i] = self.all[begin:begin + self.rows]
-        return _Problem(orders.poles, inputs, self.sensor, self.valid & used)
+        return _Problem(orders.poles, inputs, self.sensor, self.valid & used, self.highest)
 
     def centred(self):
         return np.where(self.valid, self.sensor, 0.0)
@@ -350,23 +363,28 @@ class _Problem:
     The initial values are the right-hand side's first rows: one for each pole.
     """
 
-    def __init__(self, poles, inputs, sensor, valid):
+    def __init__(self, poles, inputs, sensor, valid, highest):
         self.poles, self.inputs, self.sensor, self.used = poles, inputs, sensor, valid
+        self.highest = highest
         self.rows = len(sensor)
 
     def split(self, theta):
         return np.split(theta, [self.poles, self.poles + len(self.inputs)])
 
     def stable(self, theta):
-        """Coefficients with the poles that are not inside the unit circle reflected into it."""
+        """Coefficients with the poles that are not inside the unit circle reflected into it.
+
+        A pole above all excited frequencies must not ring on either: it would imitate noise by its
+        initial values alone. A slow one below them, as of AC coupling, shows in the phase above it.
+        """
         a, rest = theta[:self.poles], theta[self.poles:]
         poles = np.roots(np.r_[1, a])
         size = np.abs(poles)
-        if np.all(size < 1):
+        most = 1 - np.where(np.abs(np.angle(poles)) > self.highest, _SHORT, 1.0) / self.rows
+        inside = np.minimum(np.where(size < 1, size, 1 / np.maximum(size, 1)), most)
+        if np.all((size < 1) & (inside == size)):
             return theta
-        inside = np.minimum(1 / np.maximum(size, 1), 1 - 1 / self.rows)
-        poles = np.where(size < 1, poles, poles / np.maximum(size, 1) * inside)
-        return np.r_[np.poly(poles).real[1:], rest]
+        return np.r_[np.poly(poles / np.maximum(size, 1e-300) * inside).real[1:], rest]
 
     def simulate(self, theta):
         """Output without noise, and the denominator."""

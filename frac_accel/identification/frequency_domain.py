@@ -44,7 +44,7 @@ class ResponseFit(Fit):
     relative_error: float
 
 
-def fit_response(structure, points, sampling_rate_hz, delay_s=0.0):
+def fit_response(structure, points, sampling_rate_hz, delay_s=0.0, near=None):
     r"""Parameters of a structure, with sensitivity and delay, from a frequency response.
 
     Weighted least squares on amplitude and phase of :math:`G_\theta(f_k)/\hat G(f_k) - 1`, each by
@@ -61,6 +61,8 @@ def fit_response(structure, points, sampling_rate_hz, delay_s=0.0):
         Sets the range of the delay and of the unknowns.
     delay_s : float
         Rough delay to start from [s], known to half a period of the points' spacing.
+    near : ndarray, optional
+        `Fit.unknowns` of a fit in the time domain, to start from besides the grid's best.
 
     Returns
     -------
@@ -76,7 +78,9 @@ def fit_response(structure, points, sampling_rate_hz, delay_s=0.0):
         raise IdentificationError(f"{len(points)} points of the frequency response cannot give "
                                   f"{unknowns} parameters")
     problem = _Problem(structure, points, sampling_rate_hz)
-    trials = [problem.search(start, _TRIALS) for start in problem.starts(delay_s)]
+    starts = problem.starts(delay_s, _STARTS) if near is None else \
+        [*problem.starts(delay_s, 1), problem.start_at(near)]
+    trials = [problem.search(start, _TRIALS) for start in starts]
     best = problem.search(min(trials, key=lambda trial: trial.cost).x, 100)
     return problem.result(best)
 
@@ -98,8 +102,14 @@ class _Problem:
         self.low = np.r_[-np.inf, low, -np.inf]
         self.high = np.r_[np.inf, high, np.inf]
 
-    def starts(self, delay_s):
-        """The best few of the structure's grid, with either polarity, each at its best delay."""
+    def start_at(self, unknowns):
+        """Start at unknowns without sensitivity, with the one that suits them best."""
+        relative, _ = self.parts(np.r_[1.0, unknowns])
+        weight = np.minimum(self.weight[0], 100.0)**2
+        return np.r_[weight @ relative.real / (weight @ np.abs(relative)**2), unknowns]
+
+    def starts(self, delay_s, count):
+        """The grid's best `count` with either polarity, each at its best delay."""
         few = np.unique(np.linspace(0, len(self.s) - 1, _START_POINTS).astype(int))
         s, response = self.s[few], self.response[few]
         frequency = self.frequency
@@ -109,7 +119,7 @@ class _Problem:
         prepared = self.structure.prepare(s)
         peak = frequency[np.argmax(np.abs(self.response))]
         grid = self.structure.grid(frequency[0], frequency[-1], peak)
-        models = np.stack([self.structure.gradient(prepared, point)[0] for point in grid])
+        models = self.structure.gradient(prepared, grid.T[:, :, None])[0]
         relative = models / response
         reach = 1 / frequency[len(frequency) // 2] + 2 / self.rate
         delays = delay_s + np.linspace(-reach, reach, _START_DELAYS)
@@ -127,7 +137,7 @@ class _Problem:
                     seen.add(kind)
                     gain = shared[place, at[place]] / size[place, 0]
                     starts.append(np.r_[gain, grid[place], delays[at[place]] * self.rate])
-                if len(seen) == _STARTS:
+                if len(seen) == count:
                     break
         return starts
 

@@ -8,7 +8,7 @@ from .agreement import compare_domains
 from .arx import ArxStructure
 from .frequency_domain import fit_response
 from .points import ResponsePoints, response_points
-from .recognise import recognise
+from .recognise import Recognised, recognise
 
 # RMS relative error of a fit to the points with which it is a start for the time domain.
 _CLOSE = 0.1
@@ -20,14 +20,13 @@ class MeasuredResponse:
 
     Attributes
     ----------
-    excitation : dict
-        ``kind`` and ``words``.
+    excitation : Recognised
     points : ResponsePoints or None
     notes : list of str
     sampling_rate_hz : float
     """
 
-    excitation: dict
+    excitation: Recognised
     points: ResponsePoints | None
     notes: list
     sampling_rate_hz: float
@@ -41,8 +40,7 @@ class MeasuredResponse:
         except IdentificationError as error:
             found = recognise(pair.reference[:, AXES.index(axis)], pair.sampling_rate_hz)
             points, notes = None, [f"no frequency response: {error}"]
-        return cls({"kind": found.kind, "words": found.words}, points, notes,
-                   pair.sampling_rate_hz)
+        return cls(found, points, notes, pair.sampling_rate_hz)
 
     def start(self, structure):
         """Unknowns from which the time domain starts, or None where it finds them itself.
@@ -50,7 +48,7 @@ class MeasuredResponse:
         The correlation of sines, on which a start in the time domain rests, has its peak at any
         whole number of their periods.
         """
-        if self.excitation["kind"] != "stepped_sine" or not self._suits(structure):
+        if self.excitation.kind != "stepped_sine" or not self._suits(structure):
             return None
         try:
             found = fit_response(structure, self.points, self.sampling_rate_hz)
@@ -63,7 +61,8 @@ class MeasuredResponse:
         if not self._suits(structure):
             return None, []
         try:
-            other = fit_response(structure, self.points, self.sampling_rate_hz, fit["delay_s"])
+            other = fit_response(structure, self.points, self.sampling_rate_hz, fit["delay_s"],
+                                 fit.unknowns)
         except IdentificationError as error:
             return None, [f"no frequency-domain fit: {error}"]
         compared = compare_domains(fit, other)

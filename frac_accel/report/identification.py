@@ -41,6 +41,12 @@ def identification_page(result, pair, axis="x", provenance=None):
     _excitation(page.section("What was excited"), result, reference, sensor, pair)
     _response(page.section("Frequency response"), result, axis)
     _residual(page.section("Residual"), result, reference, sensor, pair)
+    if result.validation.residual:
+        _residual_tests(page.section("Residual tests"), result.validation.residual)
+    if result.validation.held_out_bands:
+        _held_out_bands(page.section("Held-out data by octaves"), result.validation)
+    if result.validation.records:
+        _records(page.section("Agreement of the records"), result.validation.records)
     return page
 
 
@@ -49,6 +55,7 @@ def _summary(section, result):
     section.text(f"The model leaves {result.nrmse:.3%} of the sensor's output unexplained (RMS of "
                  "the residual over the standard deviation of the output). "
                  + _held_out(result.held_out_nrmse))
+    section.items([sentence(words) for words in result.validation.verdict])
     if result.notes:
         section.text("Before you trust the model:").items(result.notes)
 
@@ -93,16 +100,23 @@ def _parameters(section, result):
 
 
 def _excitation(section, result, reference, sensor, pair):
-    low, high = result.model.band_hz
-    rate = pair.sampling_rate_hz
-    moving = reference - reference.mean()
-    rms, peak = np.std(moving), np.max(np.abs(moving))
-    section.text(sentence(result.excitation["words"]))
-    section.text(f"{len(pair)} samples at {rate:.6g} Hz ({len(pair) / rate:.4g} s), of which "
-                 f"{int(pair.valid.sum())} in both topics. The reference has power, and the sensor "
-                 f"answers to it, from {low:.4g} Hz to {high:.4g} Hz; elsewhere the model is "
-                 f"extrapolated. Acceleration without its mean: {rms:.4g} m/s² RMS, {peak:.4g} "
-                 "m/s² peak.")
+    excited, rate = result.excitation, pair.sampling_rate_hz
+    low, high = excited.band_hz
+    section.text(sentence(excited.description)
+                 + f" {len(pair)} samples at {rate:.6g} Hz ({len(pair) / rate:.4g} s). The "
+                 "reference has power, and the sensor answers to it, from "
+                 f"{low:.4g} Hz to {high:.4g} Hz; elsewhere the model is extrapolated.")
+    rows = [["order of persistent excitation", str(excited.order), f"{excited.needed} needed"],
+            ["RMS", f"{excited.rms:.4g}", "m/s²"],
+            ["RMS of the quietest twentieth", f"{excited.quietest_rms:.4g}", "m/s²"],
+            ["RMS of the loudest twentieth", f"{excited.loudest_rms:.4g}", "m/s²"],
+            ["peak", f"{excited.peak:.4g}", "m/s²"],
+            ["crest factor", f"{excited.crest_factor:.3g}", ""],
+            *([what, str(count), f"of {excited.samples}, left out"] for what, count in (
+                ("samples missing in a topic", excited.missing), ("clipped", excited.clipped),
+                ("standing still", excited.standing)) if count)]
+    section.table(["reference, without its mean", "value", ""], rows,
+                  "Excitation, and what does not count.")
     size = segment(len(pair))
     frequency, power = welch(reference, rate, "hann", size)
     section.figure(
@@ -191,6 +205,52 @@ def _residual(section, result, reference, sensor, pair):
                         level=noise * np.sqrt(2 / rate)),
         f"Amplitude spectral densities. White noise of the sensor: {noise:.3g} output units "
         "(standard deviation), from the residual above half the Nyquist frequency.")
+
+
+def _residual_tests(section, tests):
+    rows = [[name, f"{statistic:.1f}", str(freedom), f"{p_value:.3g}",
+             "passed" if good else "failed"]
+            for name, statistic, freedom, p_value, good in (
+                ("residual is white", tests.whiteness_statistic, len(tests.lags),
+                 tests.whiteness_p_value, tests.white),
+                ("residual does not depend on the reference", tests.independence_statistic,
+                 tests.independence_freedom, tests.independence_p_value, tests.independent))]
+    section.table(["hypothesis", "chi-squared", "degrees of freedom", "p value", "at 1 %"], rows,
+                  "Tests of the residual. Noise may be coloured; dependence on the reference means "
+                  "that something is missing from the model.")
+    section.text(f"The reference still explains {tests.dependent_share:.1%} of the residual (RMS).")
+    section.figure(figures.correlation(tests.lags, tests.autocorrelation,
+                                       tests.autocorrelation_band, y_label="autocorrelation"),
+                   "Autocorrelation of the residual, and what 99 % of the coefficients of white "
+                   "noise stay within.")
+    section.figure(figures.correlation(tests.reference_lags, tests.reference_correlation,
+                                       tests.reference_band,
+                                       "samples by which the reference is earlier",
+                                       "correlation with reference"),
+                   "Correlation of the residual with the reference, and what 99 % of the "
+                   "coefficients of unrelated noise of the same spectrum stay within.")
+
+
+def _held_out_bands(section, validation):
+    rows = [[f"{band.band_hz[0]:.4g} to {band.band_hz[1]:.4g}", f"{band.nrmse:.2%}",
+             f"{band.floor:.2%}" if np.isfinite(band.floor) else "–"]
+            for band in validation.held_out_bands if np.isfinite(band.nrmse)]
+    section.table(["band [Hz]", "residual", "no linear model explains"], rows,
+                  "RMS of the residual on data that the fit has not seen, of the output in the "
+                  "same band.")
+
+
+def _records(section, records):
+    rows = [[name, *(f"{value:.3%}" for value in line)]
+            for name, line in (*zip(records.records, records.nrmse),
+                               ("all together", records.combined_nrmse))]
+    section.table(["model of, judged on", *records.records], rows,
+                  "Residual of each record's model on each record.")
+    rows = [[name, *(f"{value:.6g} ± {std:.2g}" for value, std in zip(values, stds))]
+            for name, values, stds in zip(records.parameters, records.values.T, records.std.T)]
+    section.table(["parameter", *records.records], rows,
+                  f"Parameters of each record. Chi-squared {records.statistic:.1f} of "
+                  f"{records.freedom} degrees of freedom, p = {records.p_value:.2g}.")
 
 
 def _curve(model, frequency_hz, axis):

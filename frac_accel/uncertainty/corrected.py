@@ -4,9 +4,10 @@ import dataclasses
 
 import numpy as np
 
+from ..convolution import Convolution
 from ..errors import FracAccelError
 from ..model import AXES
-from ..simulation import Convolution, static_gain
+from ..simulation import static_gain
 from .parameters import LINEAR, UncertainAxis
 
 _DRAWS = 400

@@ -4,7 +4,8 @@ import dataclasses
 
 import numpy as np
 
-from ..core import Arx
+from ..core import Arx, FractionalTransferFunction
+from ..core.sensor_form import from_sensor_parameters, sensor_parameters
 from ..effects.base import GAIN
 from ..effects.offset import Offset
 from ..effects.time_delay import TimeDelay
@@ -21,6 +22,9 @@ _STEP = 1e-5
 # judged; and the relative distance from it that counts as none.
 _NEAR, _REACH = 0.02, 2.0
 LINEAR = 0.1
+# Of the general equation's parameters, those that are positive.
+_POSITIVE = ("natural_frequency_hz", "damping_ratio", "damping_order", "inertia_order",
+             "slope_order")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -29,9 +33,9 @@ class UncertainAxis:
 
     The covariance is that of the model file: ``covariance: {parameters: [...], matrix: [[...]]}``.
     Parameters are named as `identify` names them (those of the core, ``a1`` ... and ``b0`` ... of
-    a transfer function in z, ``delay_s``, ``offset``); those of other effects as
-    ``low_pass_lag.corner_hz``. What stands on the common core and effects holds for each axis that
-    has no model of its own.
+    a transfer function in z, those of `from_sensor_parameters` of a general equation, ``delay_s``,
+    ``offset``); those of other effects as ``low_pass_lag.corner_hz``. What stands on the common
+    core and effects holds for each axis that has no model of its own.
 
     Attributes
     ----------
@@ -152,6 +156,8 @@ class UncertainAxis:
                 step = np.zeros(len(self.values))
                 step[i] = _STEP * (abs(self.values[i]) or 1.0)
                 above, below = self.at(self.values + step), self.at(self.values - step)
+                if above is None and below is None:
+                    raise ModelError(f"{name}: {self.values[i]:g} is outside its range")
                 # at the edge of stability only one side can be had
                 step_length = step[i] * ((above is not None) + (below is not None))
                 upper, lower = (model or self.axis for model in (above, below))
@@ -259,6 +265,14 @@ def _find(axis, name, where):
     if owner == "core" and isinstance(axis.core, Arx):
         side, place = _coefficient(axis.core, key, where)
         return getattr(axis.core, side)[place], -np.inf, np.inf
+    if owner == "core" and isinstance(axis.core, FractionalTransferFunction):
+        known = sensor_parameters(axis.core)
+        if key in known:
+            # the bound itself is allowed
+            highest = np.nextafter(2.0, 3.0) if key == "inertia_order" else np.inf
+            return known[key], 0.0 if key in _POSITIVE else -np.inf, highest
+        raise ModelError(f"{where}: {name}: no such parameter, expected one of "
+                         f"{', '.join([*known, 'delay_s', 'offset'])}")
     if owner == "core":
         part = axis.core
     else:
@@ -297,6 +311,8 @@ def _coefficient(core, name, where):
 
 
 def _changed_core(core, change):
+    if isinstance(core, FractionalTransferFunction):
+        return from_sensor_parameters({**sensor_parameters(core), **change})
     if not isinstance(core, Arx):
         return dataclasses.replace(core, **change)
     sides = {"numerator": list(core.numerator), "denominator": list(core.denominator)}
