@@ -4,7 +4,11 @@ import numpy as np
 from scipy.fft import rfft
 from scipy.ndimage import uniform_filter1d
 
-from ..identification.excitation import alternating_stretches, learning_length, strongest_stretch
+from ..identification.excitation import (
+    alternating_stretches,
+    learning_length,
+    strongest_stretch,
+)
 from ..identification.uncertainty import sandwich
 from .gain import gain
 from .leftover import leftover

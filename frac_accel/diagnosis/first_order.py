@@ -4,7 +4,7 @@ import numba
 import numpy as np
 
 from ..convolution import Convolution
-from ..core.bouc_wen import follow
+from ..core.bouc_wen import follow_one_way
 from ..core.static_force import StaticForce
 from ..effects.base import CORE
 
@@ -49,15 +49,17 @@ def static_force(force, motion, sampling_rate_hz):
     if force.friction_level:
         total = total + force.friction_level * np.sign(velocity)
     if force.strength:
-        total = total + force.strength * _hysteresis(motion, velocity, 1 / sampling_rate_hz,
-                                                     force.beta, force.gamma)
+        total = total + force.strength * _hysteresis(motion, force.beta, force.gamma)
     return total
 
 
+_follow = numba.njit(cache=True)(follow_one_way)
+
+
 @numba.njit(cache=True)
-def _hysteresis(motion, velocity, step, beta, gamma):
+def _hysteresis(motion, beta, gamma):
+    """Bouc-Wen variable along a motion; turns between two samples are taken as at one of them."""
     z = np.zeros(len(motion))
     for i in range(1, len(motion)):
-        z[i] = follow(z[i - 1], motion[i - 1], velocity[i - 1], motion[i], velocity[i], step, beta,
-                      gamma)
+        z[i] = _follow(z[i - 1], motion[i] - motion[i - 1], beta, gamma)
     return z

@@ -189,11 +189,14 @@ def _data(section, found, problem=None):
     if problem is None:
         section.text(f"{seen.samples} samples of the sensor.")
         return
-    record, rest = problem.record, 1 - found.engine.split / len(problem.record)
+    record, rows = problem.record, found.engine.held_out_rows
+    parts = int(np.sum(np.diff(rows.astype(int)) > 0))
     section.text(f"{len(record)} samples at {record.sampling_rate_hz:.6g} Hz "
                  f"({len(record) / record.sampling_rate_hz:.4g} s), of which "
                  f"{int(record.valid.sum())} in both topics and {problem.count} used. Held-out "
-                 f"errors are of the last {rest:.0%} of the record, by fits to what comes before.")
+                 f"errors are of {rows.mean():.0%} of the record, "
+                 + ("its last part, by fits to what comes before." if parts <= 1 else
+                    f"{parts} stretches of it, by fits to the stretches between."))
     sought = "was recorded and is accounted for" if record.temperature_c is not None else \
         "was not recorded: what depends on it cannot be found"
     section.text(f"The temperature {sought}.")
