@@ -219,10 +219,10 @@ class StaticTermsState:
         doubt = np.zeros_like(q)
         if force.friction_level:
             # of a velocity that turns between two instants, the mean sign counts
-            total += force.friction_level * _mean_sign(change, change_noise**2 + bend**2 / 12)
-            # while the mass sticks, all that is known of the friction is that it is less than its
-            # level; that it sticks shows as a velocity below the noise
-            sign = _mean_sign(change, change_noise**2)
+            sign = _mean_sign(change, change_noise**2 + bend**2 / 12)
+            total += force.friction_level * sign
+            # While the mass sticks, which shows as a velocity below the noise, all that is known
+            # of the friction is that it is less than its level; the same where it turns.
             doubt += force.friction_level * np.sqrt(np.maximum(1 - sign**2, 0))
         if force.strength:
             total += force.strength * self._hysteresis(q)
