@@ -58,7 +58,7 @@ def _verdict(section, found):
     before, after = found.baseline, found.extended
     section.text(
         f"On held-out data the model in use is wrong by {before['rmse']:.4g} output units (RMS), "
-        f"{percent(before['nrmse'])} of the output; the noise is {before['noise_rms']:.4g}.")
+        f"{percent(before['nrmse'])} of the output; {before['noise_rms']:.4g} may be noise.")
     section.items(_short(finding) for finding in found.findings)
     if found.findings:
         section.text(
@@ -133,7 +133,8 @@ def _suspects(section, found):
     section.table(["suspects", "margin", "experiment that tells"],
                   [[_listed(suspect["causes"]), f"{suspect['margin']:.3g}", suspect["experiment"]]
                    for suspect in found.suspects],
-                  "Margin: by how many variances of the noise the first choice is ahead.")
+                  "Margin: by how many variances of the noise the first choice is ahead of its "
+                  "nearest rival; 0 where too much is left for any margin to count.")
 
 
 def _model(section, found, problem):

@@ -93,13 +93,12 @@ def _in_frequency(section, compared, noise_rms):
     frequency, output = density(np.where(p.used, p.measured, 0.0))
     residuals = {f"residual, {name}": density(values)[1]
                  for name, values in compared.residuals.items()}
-    # the colours of the other figures: the model in use comes second there and third here
     section.figure(
-        figures.spectra(frequency, {"measured output": output,
-                                    **dict(reversed(residuals.items()))},
-                        level=noise_rms * np.sqrt(2 / p.rate)),
-        "Amplitude spectral densities of the output and of the residuals, and white noise of "
-        f"{noise_rms:.3g} output units (RMS), which is the noise that was found.")
+        figures.spectra(frequency, {"measured output": output, **residuals},
+                        level=noise_rms * np.sqrt(2 / p.rate),
+                        colours=(figures.MEASURED, *figures.SERIES)),
+        "Amplitude spectral densities of the output and of the residuals, and of white noise as "
+        f"strong as what may be noise: {noise_rms:.3g} output units (RMS).")
 
 
 def _by_amplitude(section, compared):

@@ -189,7 +189,8 @@ def time_signals(time_s, signals, residual=None, unit="output units"):
     return figure
 
 
-def spectra(frequency_hz, densities, unit="output units", level=None):
+def spectra(frequency_hz, densities, unit="output units", level=None,
+            colours=(MEASURED, RESIDUAL, *SERIES)):
     """Amplitude spectral densities.
 
     Parameters
@@ -200,6 +201,8 @@ def spectra(frequency_hz, densities, unit="output units", level=None):
         Of the signals.
     level : float, optional
         Density of white noise, drawn as a line.
+    colours : sequence of str
+        Of the densities in their order.
 
     Returns
     -------
@@ -207,7 +210,7 @@ def spectra(frequency_hz, densities, unit="output units", level=None):
     """
     figure = _rows(1, 420, "frequency [Hz]", [f"density [{unit}/√Hz]"], x_type="log")
     above = frequency_hz > 0
-    for (name, values), colour in zip(densities.items(), (MEASURED, RESIDUAL, *SERIES)):
+    for (name, values), colour in zip(densities.items(), colours):
         _line(figure, frequency_hz[above], values[above], 1, name, colour,
               legend=len(densities) > 1 or level is not None)
     if level is not None:

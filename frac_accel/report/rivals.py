@@ -23,10 +23,11 @@ def rivals(section, found):
     shown = [best, *[fit for fit in fits if fit is not bare][:_MOST]]
     if bare is not best:
         shown.append(bare)
+    chosen = "fits best, but is not sure: see above" if found.suspects else "chosen"
     rows = [[" + ".join(sorted(fit.causes - base)) or "(the model in use)",
              str(len(fit.unknowns)), f"{np.sqrt(fit.cost / samples):.4g}",
              "–" if fit is best else f"{engine.score(fit, variance) - own:.3g}",
-             "chosen" if fit is best else _why(fit, best)] for fit in shown]
+             chosen if fit is best else _why(fit, best)] for fit in shown]
     section.table(
         ["causes", "parameters", "RMSE", "behind by", "why not"], rows,
         f"The sets of causes that describe the whole record best, of "
