@@ -180,7 +180,7 @@ def test_temperature_of_part_of_the_record(files, tmp_path):
                                                  np.full(len(stamps), np.nan), "accel_link")
     write_bag(tmp_path / "part.mcap", topics)
     said = diagnose(tmp_path, str(tmp_path / "part.mcap"), model)
-    assert [finding["cause"] for finding in said["findings"]] == ["time_delay"]
+    assert [finding["cause"] for finding in said["findings"]] == ["mounting_resonance"]
 
 
 def cut(samples, rows):
@@ -198,14 +198,14 @@ def test_values_that_are_not_finite_are_left_out(files, tmp_path):
     said = diagnose(tmp_path, *changed(files, tmp_path, sensor=holed))
     assert any("300 samples are not finite" in words for words in said["integrity"])
     # a value that is no number is no message that was lost
-    assert [finding["cause"] for finding in said["findings"]] == ["time_delay"]
+    assert [finding["cause"] for finding in said["findings"]] == ["mounting_resonance"]
 
 
 def test_reference_that_ends_half_way(files, tmp_path):
     source, model = changed(files, tmp_path, reference=lambda samples: cut(
         samples, slice(0, len(samples.stamps_ns) // 2)))
     said = diagnose(tmp_path, source, model)
-    assert [finding["cause"] for finding in said["findings"]] == ["time_delay"]
+    assert [finding["cause"] for finding in said["findings"]] == ["mounting_resonance"]
 
 
 @pytest.mark.parametrize("lost, verdict", [
