@@ -16,7 +16,6 @@ from .engine import Engine
 from .judgement import Diagnosis, Finding, Loose, insufficient, judge
 from .leftover import related
 from .record import Record
-from .starts import CAUSES
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
 
@@ -88,7 +87,8 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
             {"delay_s": float(np.hypot(std, known.std["delay_s"] if known else 0.0))})
     engine = Engine(record, column, model, used,
                     {cause: entry.effect for cause, entry in loose.items()},
-                    [cause for cause in CAUSES if cause in known_effects()], progress)
+                    [cause for cause, effect in known_effects().items()
+                     if not effect.read_off], progress)
     _require_relation(engine, axis, seed)
     return judge(engine, engine.run(seed), found, fixed, loose, source[1])
 

@@ -24,6 +24,8 @@ _LONG = 40_000
 # A last part with less than this of the motion before it proves little; stretches instead of it.
 _QUIET_END = 0.5
 _STRETCHES = 20
+# Parts of the record in which a cause's strength is compared.
+_PARTS = 5
 
 
 def noise_peak(residual, used):
@@ -49,11 +51,10 @@ def held_out(reference):
 class Engine:
     """Search, competition and judgement for one record."""
 
-    def __init__(self, record, axis, baseline, used, base=None, candidates=None, log=None):
+    def __init__(self, record, axis, baseline, used, base=None, candidates=(), log=None):
         self.problem = Problem(record, axis, baseline, used)
         self._wanted = used
-        keywords = {"candidates": candidates} if candidates else {}
-        self.search = Search(self.problem, base, log=log, **keywords)
+        self.search = Search(self.problem, base, candidates, log)
         self.held_out_rows = used & self.problem.used & held_out(record.reference[:, axis])
         self._learnt = {}
         # what the numerics of the simulation may still be wrong by
@@ -160,6 +161,26 @@ class Engine:
                 simulated = step * np.round(simulated / step)
             errors.append((self.problem.measured - simulated)[self.held_out_rows])
         return gain(*errors)
+
+    def unsteadiness(self, best, cause):
+        """Largest deviation from 1 of a cause's strength in parts of the record.
+
+        What a cause adds is scaled to the measured output in stretches of time and in classes of
+        the output's size, all with an equal share of it. A cause that only resembles the true one
+        is too strong in some and too weak in others.
+        """
+        p = self.problem
+        less = {name: effect for name, effect in best.effects.items() if name != cause}
+        added = p.clear(best.simulated - p.simulate(less), best.free)
+        energy, shared = added**2, added * (best.residual + added)
+        worst = 0.0
+        for order in (np.arange(len(added)), np.argsort(np.abs(best.simulated))):
+            total = np.cumsum(energy[order])
+            part = np.minimum((total / total[-1] * _PARTS).astype(int), _PARTS - 1)
+            strengths = (np.bincount(part, shared[order], _PARTS)
+                         / np.maximum(np.bincount(part, energy[order], _PARTS), 1e-300))
+            worst = max(worst, float(np.max(np.abs(strengths - 1))))
+        return worst
 
     def noise_only(self, fitted):
         """Whether a fit leaves nothing but noise."""

@@ -15,6 +15,10 @@ from .gain import gain
 
 # Share of the baseline's excess power that may be left where causes are named.
 _LEFT = 0.03
+# Largest deviation of a named cause's strength in parts of a record that holds something else too.
+_STEADY = 0.2
+# Share of the residual's power that may be no noise in a record that counts as explained.
+_MOSTLY_NOISE = 0.3
 # Share of the held-out error that a cause must take away to matter.
 _RELEVANT = 0.005
 # Margin, in variances of the noise, by which a cause must beat its nearest rival.
@@ -202,15 +206,17 @@ def _verdict(engine, best, left, findings, suspects, found):
     remains = max(best.cost / p.count - noise**2, 0.0)
     # differences that chance makes are no remains
     fraction = remains / excess if left.share > 0 and excess > 0 else 0.0
-    if fraction > _LEFT:
-        # what is left could have been mistaken for any of the causes
-        suspects += [_suspect({f.cause}, 0.0) for f in findings if f.cause in best.effects]
-        findings = [f for f in findings if f.cause not in best.effects]
+    if left.share > 0:
+        # something is left, which the causes may have been bent by, or mistaken for
+        doubtful = {f.cause for f in findings if f.cause in best.effects
+                    and (fraction > _LEFT or engine.unsteadiness(best, f.cause) > _STEADY)}
+        suspects += [_suspect({cause}, 0.0) for cause in sorted(doubtful)]
+        findings = [f for f in findings if f.cause not in doubtful]
     named = {f.cause for f in findings}
     complete = {c for c in best.effects if c not in engine.search.base} <= named
     if not findings and not suspects and left.share == 0:
         verdict, reason = "consistent", "the model explains the record down to its noise"
-    elif findings and complete and fraction <= _LEFT:
+    elif findings and complete and left.share <= _MOSTLY_NOISE:
         verdict, reason = "explained", "the named causes explain the record down to its noise"
     elif findings:
         verdict, reason = "partly_explained", "the named causes leave a part unexplained"

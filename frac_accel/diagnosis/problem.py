@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from ..effects.base import CROSS_AXIS, GAIN
+from ..effects.base import CROSS_AXIS, GAIN, Effect
 from ..effects.time_delay import TimeDelay
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel
@@ -147,9 +147,9 @@ class Problem:
         forces: cheap, and right for small ones.
         """
         linear = {name: other for name, other in effects.items()
-                  if name not in FORCES and name != cause}
+                  if not acts_on_spring(other) and name != cause}
         model = self._on_stamps(self.axis_model(linear))
-        if cause in FORCES:
+        if acts_on_spring(effect):
             added = self.force(model, effect)
             if cause in effects:
                 added = added - self.force(model, effects[cause])
@@ -257,7 +257,7 @@ class Problem:
 
     def jacobian(self, effects, unknowns, theta, simulated, free):
         columns = np.zeros((len(self.record), len(unknowns)))
-        forced = any(cause in FORCES for cause in effects)
+        forced = any(map(acts_on_spring, effects.values()))
         for i, unknown in enumerate(unknowns):
             for step in (_STEP, -_STEP):
                 moved = theta.copy()
@@ -266,7 +266,7 @@ class Problem:
                     continue
                 try:
                     new = self.replaced(effects, unknowns, moved)
-                    if forced and unknown.cause not in FORCES:
+                    if forced and not acts_on_spring(effects[unknown.cause]):
                         change = self.change(effects, unknown.cause, new[unknown.cause])
                     else:
                         change = self.simulate(new) - simulated
@@ -287,13 +287,11 @@ class Problem:
     def unknowns(self, effect):
         """Unknowns of one effect."""
         result = []
-        for field in parameter_fields(type(effect)):
+        for field in [] if effect.read_off else parameter_fields(type(effect)):
             if effect.cause == "cross_axis_sensitivity":
                 other = AXES.index(field.name)
                 if other == self.axis or not np.ptp(self.record.reference[:, other]):
                     continue
-            if effect.cause in FIXED:
-                continue
             value, limits = getattr(effect, field.name), field.metadata
             logarithmic = limits["above"] == 0 and limits["below"] is None
             scale = self.scale(effect.cause, field.name, value)
@@ -328,10 +326,9 @@ class Problem:
         return typical.get(name, max(abs(value), 1e-12))
 
 
-# Causes that act on the core's spring.
-FORCES = ("quadratic_stiffness", "cubic_stiffness", "coulomb_friction", "hysteresis")
-# Causes whose parameters are read off the record and not fitted.
-FIXED = ("clipping", "quantization", "dropped_samples", "timestamp_jitter")
+def acts_on_spring(effect):
+    """Whether an effect changes the force of the core's spring."""
+    return type(effect).add_force is not Effect.add_force
 
 
 def _to_theta(value, unknown):

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 
+from ..effects import known_effects
 from ..errors import FracAccelError
-from .starts import CAUSES, starts
 
 _BEAM = 3
 # Factors within which a finite change can be had by a nearby start.
@@ -38,7 +38,7 @@ class View:
 class Search:
     """Fits sets of causes, each once."""
 
-    def __init__(self, problem, base=None, candidates=CAUSES, log=None):
+    def __init__(self, problem, base=None, candidates=(), log=None):
         self.problem, self.base = problem, base or {}
         self.candidates = candidates
         self.fits = {}
@@ -88,7 +88,8 @@ class Search:
         for cause in self.candidates:
             if cause in fitted.effects:
                 continue
-            options = [self._option(start, fitted, cause, known) for start in starts(cause, view)]
+            options = [self._option(start, fitted, cause, known)
+                       for start in known_effects()[cause].starts(view)]
             best = min((option for option in options if option), key=lambda option: option[0],
                        default=None)
             if best:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import CONDITIONER, Effect
+from .fit_starts import grid
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,3 +29,7 @@ class AcCoupling(Effect):
 
     def zeros(self):
         return np.array([0.0])
+
+    @classmethod
+    def starts(cls, view):
+        return grid([cls(corner) for corner in view.rate * np.geomspace(5e-2, 2e-6, 18)])

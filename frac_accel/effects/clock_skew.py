@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import DELAY, Effect
+from .fit_starts import finite, free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,3 +22,7 @@ class ClockSkew(Effect):
 
     def clock_ratio(self):
         return 1 + 1e-6 * self.skew_ppm
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(1.0), "skew_ppm"), finite(cls(100.0)), finite(cls(-100.0))]

@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import CORE, Effect, require_oscillator
+from .fit_starts import positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,3 +24,7 @@ class CoulombFriction(Effect):
 
     def add_force(self, force):
         return dataclasses.replace(force, friction_level=force.friction_level + self.level)
+
+    @classmethod
+    def starts(cls, view):
+        return [positive(cls(0.01 * view.level), "level")]

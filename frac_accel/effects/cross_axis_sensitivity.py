@@ -8,6 +8,7 @@ import numpy as np
 from ..errors import ModelError
 from ..parameters import parameter
 from .base import CROSS_AXIS, Effect
+from .fit_starts import Start
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,3 +56,9 @@ def _inverse(by_axis):
 def _mix(values, matrix):
     """values @ matrix.T, summed in a fixed order: BLAS would round by the block's length."""
     return sum(values[:, [axis]] * matrix[:, axis] for axis in range(3))
+
+    @classmethod
+    def starts(cls, view):
+        others = [axis for axis in "xyz" if view.excited[axis] and axis != view.axis]
+        return [Start(cls(**dict.fromkeys(others, 1e-3)),
+                      tuple(cls(**{axis: 1e-3}) for axis in others), "free")] if others else []

@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import CORE, Effect, require_oscillator
+from .fit_starts import free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,3 +24,7 @@ class CubicStiffness(Effect):
 
     def add_force(self, force):
         return force.with_power(3, self.alpha3)
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(1e-3 / view.level**2), "alpha3")]

@@ -7,6 +7,7 @@ from scipy.special import erf
 
 from ..parameters import parameter
 from .base import DEAD_ZONE, Effect
+from .fit_starts import positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,3 +32,7 @@ class DeadZone(Effect):
         sign = np.where(variance > 0, sign, np.sign(values))
         doubt = self.half_width**2 / 3 * (1 - sign**2)
         return values + sign * self.half_width, variance + doubt
+
+    @classmethod
+    def starts(cls, view):
+        return [positive(cls(share * view.level), "half_width") for share in (0.01, 0.05, 0.2)]

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import GAIN, Effect
+from .fit_starts import free
 
 _LEAST = 1e-3
 
@@ -32,3 +33,7 @@ class GainDrift(Effect):
 
     def _gain(self, circumstances):
         return 1 + self.rate_per_s * circumstances.time_s
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(1e-3), "rate_per_s")]

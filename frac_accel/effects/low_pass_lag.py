@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import CONDITIONER, Effect
+from .fit_starts import grid
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,3 +27,7 @@ class LowPassLag(Effect):
 
     def poles(self):
         return np.array([-2 * np.pi * self.corner_hz])
+
+    @classmethod
+    def starts(cls, view):
+        return grid([cls(corner) for corner in view.rate * np.geomspace(0.02, 20, 13)])

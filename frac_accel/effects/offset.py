@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import OFFSET, Effect
+from .fit_starts import free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,3 +24,7 @@ class Offset(Effect):
 
     def invert(self, values, variance, circumstances):
         return values - self.offset, variance
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(0.01 * view.level), "offset")]

@@ -13,6 +13,7 @@ class Quantization(Effect):
     """Values are rounded to whole steps."""
 
     cause = "quantization"
+    read_off = True
     stage = QUANTIZATION
     explanation = "The output has a coarse resolution."
     experiment = "Repeat at a tenth of the level: the steps between the values stay as large."

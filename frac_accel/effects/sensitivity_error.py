@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import GAIN, Effect
+from .fit_starts import finite, free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,3 +26,7 @@ class SensitivityError(Effect):
 
     def reference_gain(self):
         return abs(self.gain)
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(1.01)), finite(cls(-1.0))]

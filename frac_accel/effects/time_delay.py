@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import DELAY, Effect
+from .fit_starts import bulk_shift, finite, free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,3 +23,9 @@ class TimeDelay(Effect):
 
     def pure_delay_s(self):
         return self.delay_s
+
+    @classmethod
+    def starts(cls, view):
+        begin = [free(cls(view.delay_s + 0.1 / view.rate))]
+        lag = bulk_shift(view.simulated, view.measured, view.used)
+        return begin + ([finite(cls(view.delay_s + lag / view.rate))] if lag else [])

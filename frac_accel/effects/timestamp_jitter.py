@@ -11,6 +11,7 @@ class TimestampJitter(Effect):
     """Stamps scatter around the instants of the samples, whose values are as they are."""
 
     cause = "timestamp_jitter"
+    read_off = True
     stage = STAMPS
     explanation = "The stamps scatter around the instants at which the samples were taken."
     experiment = ("Let the sensor's own clock or a hardware trigger stamp the samples: the "
