@@ -42,6 +42,7 @@ setup(
         "mcap>=1.6.0",  # Writer.flush
         "tqdm",
         "matplotlib",
+        "numba>=0.57",  # simulation of nonlinear springs and friction
     ],
     entry_points={
         "console_scripts": [
