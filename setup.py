@@ -43,6 +43,7 @@ setup(
         "tqdm",
         "matplotlib",
         "plotly>=5.13",
+        "numba>=0.57",  # simulation of nonlinear springs and friction
     ],
     entry_points={
         "console_scripts": [
