@@ -55,8 +55,13 @@ class Search:
 
     def fit_all(self, sets):
         """Fitted sets by cost; those that fall far behind are not fitted to the end."""
-        trials = [(self.fits.get(frozenset(effects)) or self.problem.fit(effects, _TRIAL), effects)
-                  for effects in sets]
+        trials = []
+        for effects in sets:
+            try:
+                trials.append((self.fits.get(frozenset(effects))
+                               or self.problem.fit(effects, _TRIAL), effects))
+            except FracAccelError:
+                continue  # a motion without bound describes no record
         best = min((fit.cost for fit, _ in trials), default=0.0)
         fits = []
         for trial, effects in trials:
