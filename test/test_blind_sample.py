@@ -5,7 +5,7 @@ from blind import score
 from blind.plan import plan
 from blind.trial import run
 
-pytest.importorskip("frac_accel.diagnosis")
+pytestmark = pytest.mark.long
 
 SEED_SET = 900  # not one that the suite's page is made with
 SHARES = 4      # of the single causes, so that two workers are equally busy

@@ -11,6 +11,8 @@ from frac_accel.effects.time_delay import TimeDelay
 from frac_accel.model import SensorModel
 from frac_accel.uncertainty import corrected_uncertainty
 
+pytestmark = pytest.mark.long
+
 RATE_HZ = 2000.0
 NAMES = ["sensitivity", "natural_frequency_hz", "damping_ratio", "delay_s", "offset"]
 

@@ -6,6 +6,8 @@ from scipy.signal import butter, lfilter
 
 from frac_accel.diagnosis.leftover import leftover, related
 
+pytestmark = pytest.mark.long
+
 N = 12_000
 
 

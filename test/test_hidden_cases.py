@@ -8,6 +8,8 @@ from rig.hidden import EXCITATIONS, KINDS, draw_case, draw_causes
 from frac_accel import read_bag, simulate
 from frac_accel.bag import read_temperature
 
+pytestmark = pytest.mark.long
+
 RATE = 2000.0
 STAMPS = {"timestamp_jitter", "dropped_samples"}
 

@@ -14,6 +14,8 @@ from frac_accel.identification.continuous_poles import continuous_poles
 from frac_accel.pair import make_pair
 from frac_accel.samples import Samples
 
+pytestmark = pytest.mark.long
+
 RATE_HZ = 2000.0
 BAND_HZ = np.geomspace(10.0, 600.0, 60)
 S = 2j * np.pi * BAND_HZ

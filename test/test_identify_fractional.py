@@ -10,6 +10,8 @@ from frac_accel.identification.structures import FractionalStructure
 from frac_accel.pair import make_pair
 from frac_accel.samples import Samples
 
+pytestmark = pytest.mark.long
+
 RATE_HZ = 2000.0
 
 

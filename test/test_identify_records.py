@@ -15,6 +15,8 @@ from frac_accel.identification.records import agreement, combine
 from frac_accel.pair import make_pair
 from frac_accel.samples import Samples
 
+pytestmark = pytest.mark.long
+
 RATE_HZ = 2000.0
 PARAMETERS = ("sensitivity", "natural_frequency_hz", "damping_ratio", "delay_s")
 

@@ -17,6 +17,8 @@ from frac_accel.identification.clipping import lattice_step
 from frac_accel.pair import make_pair
 from frac_accel.samples import Samples
 
+pytestmark = pytest.mark.long
+
 RATE_HZ = 2000.0
 X_ONLY = (1.0, 0.0, 0.0)
 BAGS = Path(__file__).parents[1] / "bags"

@@ -20,6 +20,8 @@ from frac_accel.effects import known_effects
 from frac_accel.report.diagnosis import diagnosis_page
 from frac_accel.report.quantity import rounded
 
+pytestmark = pytest.mark.long
+
 BAG = Path(__file__).resolve().parents[1] / "bags" / "soft_mount.mcap"
 MODEL = BAG.with_suffix(".yaml")
 

@@ -14,6 +14,8 @@ from frac_accel.identification.structures import OscillatorStructure
 from frac_accel.pair import make_pair
 from frac_accel.samples import Samples
 
+pytestmark = pytest.mark.long
+
 RATE_HZ = 2000.0
 STRUCTURE = OscillatorStructure()
 

@@ -6,6 +6,8 @@ import rig
 from rig.oscillator import integrate
 from scipy.integrate import solve_ivp
 
+pytestmark = pytest.mark.long
+
 REQUIRED = 5e-4  # of the signal's RMS, both as in test_rig_accuracy.py
 MEASURED = 2e-5
 
