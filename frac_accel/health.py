@@ -181,6 +181,11 @@ def _troubles(s):
         troubles.append(f"not received from another publisher: {'; '.join(refused)}")
     if _other_rate(s):
         troubles.append(f"sample_rate_hz is {s.stated_rate_hz:.6g}{_other_rate(s)}")
+    if changes.get("without_temperature"):
+        troubles.append("no temperature has come, so 25 °C is assumed, with an uncertainty of 35 K")
+    if changes.get("clipped"):
+        troubles.append(f"{changes['clipped']} samples are at the limits of the model's range; "
+                        "their variance says so")
     if s.findings.clipped_axes:
         troubles.append(f"axis {', '.join(s.findings.clipped_axes)} seems to be clipped")
     if s.findings.constant:

@@ -1,5 +1,7 @@
 """Simulation of a sensor live, sample by sample."""
 
+import numpy as np
+
 from .correction.design import design_simulator
 from .correction.stream import Stream
 
@@ -21,11 +23,20 @@ class LiveSimulator(Stream):
     Notes
     -----
     See `Stream` for how samples flow. Each keeps the stamp of the reference sample that it belongs
-    to, so the sensor's own delay is in the values, as in `simulate`.
+    to, so the sensor's own delay is in the values, as in `simulate`; only a skewed clock changes
+    stamps. A nonlinear spring and friction are simulated offline alone.
     """
 
     def _design(self, model, sample_rate_hz, **wishes):
         return design_simulator(model, sample_rate_hz, **wishes)
 
-    def _after(self, values):
-        return self._model.apply_sample_effects(values)
+    def _after(self, values, index, stamps_ns):
+        return self._model.apply_sample_effects(values, self._circumstances(index, stamps_ns))
+
+    def _stamps(self, stamps_ns):
+        """A clock that runs slow puts the same instant at an earlier stamp."""
+        ratio = self._model.axes[0].clock_ratio
+        if ratio == 1:
+            return stamps_ns
+        since = stamps_ns - self._record_start_ns
+        return stamps_ns + np.round((1 / ratio - 1) * since).astype(np.int64)

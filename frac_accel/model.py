@@ -2,17 +2,17 @@
 
 import dataclasses
 import difflib
-import os
-import tempfile
-from pathlib import Path
+import functools
 
 import numpy as np
 import yaml
 
-from .core import CORES
-from .effects import known_effects
+from .atomic_file import write_text
+from .core import CORES, Arx
+from .core.static_force import StaticForce
+from .effects import Circumstances, Effect, known_effects
 from .errors import ModelError
-from .parameters import as_mapping, build, number, plain
+from .parameters import as_mapping, build, number, parameter_fields, plain
 
 SCHEMA = "frac_accel/sensor_model/1"
 AXES = "xyz"
@@ -44,14 +44,39 @@ class AxisModel:
         return core
 
     @property
+    def static_force(self):
+        """StaticForce of the core's spring beyond its linear part; false where there is none."""
+        force = StaticForce()
+        for effect in self.effects:
+            force = effect.add_force(force)
+        return force
+
+    @property
     def delay_s(self):
         """Sum of the pure delays [s]: the value stamped t belongs to t - delay_s."""
         return sum(effect.pure_delay_s() for effect in self.effects)
 
     @property
+    def clock_ratio(self):
+        """Time that passes while the stamps advance by one second."""
+        return float(np.prod([effect.clock_ratio() for effect in self.effects]))
+
+    @property
+    def limits(self):
+        """Lowest and highest value that can come out."""
+        low, high = -np.inf, np.inf
+        for effect in self.effects:
+            if np.isfinite([low, high]).any():
+                # what stands behind the limits, such as a rounding, moves them
+                low, high = effect.simulate(np.array([low, high]), Circumstances.at_rest(2))
+            lower, upper = effect.limits()
+            low, high = max(low, lower), min(high, upper)
+        return low, high
+
+    @property
     def dynamics(self):
         """The core and the linear links around it, without pure delays."""
-        return (self.effective_core, *self.effects)
+        return (self.effective_core, *(effect for effect in self.effects if _is_link(effect)))
 
     def transfer_function(self, s):
         """Composite linear response without its pure delay, at complex `s` [rad/s]."""
@@ -112,6 +137,11 @@ class SensorModel:
         """AxisModel of ``"x"``, ``"y"``, ``"z"`` or 0, 1, 2."""
         return self.axes[AXES.index(axis) if isinstance(axis, str) else axis]
 
+    @functools.cached_property
+    def needs_temperature(self):
+        """Whether an effect of some axis depends on the temperature."""
+        return any(effect.needs_temperature for axis in self.axes for effect in axis.effects)
+
     @property
     def noise_std(self):
         """Standard deviation of the sensor's white noise [output units]; 0 where not known."""
@@ -140,17 +170,56 @@ class SensorModel:
         model = self.axis(axis)
         return model.transfer_function(s) * np.exp(-s * model.delay_s)
 
-    def apply_sample_effects(self, values):
-        """Effects that act on the samples after the linear response; shape (n, 3) in and out."""
+    def apply_sample_effects(self, values, circumstances):
+        """Effects that act on the samples after the core and its links.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n, 3)
+        circumstances : Circumstances
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+        """
         for effect, by_axis in self._stages:
-            values = effect.simulate(values, by_axis)
+            values = effect.simulate_axes(values, by_axis, circumstances)
         return values
 
-    def remove_sample_effects(self, values):
-        """Inverse of `apply_sample_effects`."""
-        for effect, by_axis in reversed(self._stages):
-            values = effect.invert(values, by_axis)
-        return values
+    def remove_sample_effects(self, values, circumstances, variance=None):
+        """Inverse of `apply_sample_effects`.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n, 3)
+        circumstances : Circumstances
+        variance : ndarray, shape (n, 3), optional
+            Variance of the samples' noise; default 0.
+
+        Returns
+        -------
+        values, variance : ndarray, shape (n, 3)
+        """
+        if variance is None:
+            variance = np.zeros_like(values)
+        return _removed(self._stages, values, variance, circumstances)
+
+    def live_inverse(self, sampling_rate_hz):
+        """`remove_sample_effects` for consecutive blocks of one stream at a rate [Hz].
+
+        Returns
+        -------
+        callable
+            (values, variance, circumstances) -> (values, variance).
+        """
+        stages = [(cause, {axis: effect.live(sampling_rate_hz) for axis, effect in by_axis.items()})
+                  for cause, by_axis in self._stages]
+        return functools.partial(_removed, stages)
+
+    @functools.cached_property
+    def limits(self):
+        """Lowest and highest value that each axis can say, shape (3,) each."""
+        return tuple(np.array([axis.limits for axis in self.axes]).T)
 
     @classmethod
     def from_dict(cls, data, where=""):
@@ -244,22 +313,17 @@ class SensorModel:
 
     def save(self, path):
         """Write the model as YAML; the file is complete or not there."""
-        path = Path(path)
         text = yaml.safe_dump(self.to_dict(), sort_keys=False, allow_unicode=True)
-        temporary = None
         try:
-            handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-            with open(handle, "w", encoding="utf-8") as file:
-                file.write(text)
-            # mkstemp makes the file for its owner alone
-            umask = os.umask(0)
-            os.umask(umask)
-            os.chmod(temporary, 0o666 & ~umask)
-            os.replace(temporary, path)
+            write_text(path, text)
         except OSError as error:
-            if temporary:
-                os.unlink(temporary)
             raise ModelError(f"{path}: cannot write the model: {error.strerror}") from None
+
+
+def _removed(stages, values, variance, circumstances):
+    for cause, by_axis in reversed(stages):
+        values, variance = cause.invert_axes(values, variance, by_axis, circumstances)
+    return values, variance
 
 
 def _sample_stages(axes):
@@ -295,8 +359,13 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
+def _is_link(effect):
+    """Whether an effect is a linear link (the base class's response is one throughout)."""
+    return type(effect).transfer_function is not Effect.transfer_function
+
+
 def _in_signal_order(effects):
-    effects = tuple(sorted(effects, key=lambda effect: effect.stage))
+    effects = tuple(sorted(effects, key=lambda effect: (effect.stage, effect.cause)))
     causes = [effect.cause for effect in effects]
     for cause in causes:
         if causes.count(cause) > 1:
@@ -335,6 +404,12 @@ def _core(entry, where):
     kind = entry.pop("type", "oscillator")
     if not isinstance(kind, str) or kind not in CORES:
         raise ModelError(f"{where}.type: {kind!r} given, expected one of {', '.join(CORES)}")
+    if CORES[kind] is not Arx:
+        for field in parameter_fields(Arx):
+            if field.name in entry:
+                raise ModelError(f"{where}.{field.name}: given for a core of type {kind}, but it "
+                                 "belongs to a transfer function in z: expected type: arx; "
+                                 "coefficients in z have no place in an equation in s")
     try:
         return build(CORES[kind], entry, where)
     except ModelError as error:

@@ -1,19 +1,25 @@
 """Simulation of a sensor model from a sampled reference."""
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 
+from .convolution import Convolution, at_positions
 from .core import Arx
+from .effects.base import CORE, GAIN, Circumstances
 from .errors import FracAccelError, ModelError
 from .model import AXES
 
-# Fall of the damped kernel over one period of the transform: what wraps around is below 1e-8
-# of the response, and undoing the damping over half the period costs four of sixteen digits.
-_DAMPING = np.log(1e8)
+# Factor by which the response of a linear sensor is refined before it is read between samples.
+_REFINED = 4
+# A nonlinear core is stepped this often in each sampling interval, and in each natural period.
+_STEPS_PER_SAMPLE = 8
+_STEPS_PER_PERIOD = 24
+_MOST_STEPS_PER_SAMPLE = 64
+# Samples that a response between samples needs after the last one.
+_BEYOND = 8
 
 
-def simulate(model, reference, sampling_rate_hz, axis=None, initial="rest"):
-    r"""Output of a sensor, from the acceleration of its base.
+def simulate(model, reference, sampling_rate_hz, axis=None, initial="rest", temperature_c=None):
+    """Output of a sensor, from the acceleration of its base.
 
     Parameters
     ----------
@@ -25,26 +31,26 @@ def simulate(model, reference, sampling_rate_hz, axis=None, initial="rest"):
         The axis of a one-column reference. The other two axes are then at rest.
     initial : {"rest", "steady"}
         Motion before the record: none, or the first sample's value for ever (gravity).
+    temperature_c : array_like, shape (n,) or (), optional
+        Temperature [°C]; needed by a model with temperature_sensitivity.
 
     Returns
     -------
     ndarray, same shape as `reference`
-        Output in the sensor's units at the same instants.
+        Output in the sensor's units at the same instants. Lost samples and scattering stamps
+        change no value.
 
     Raises
     ------
     FracAccelError
-        If the reference is not finite, empty or of the wrong shape.
+        If the reference is not finite, empty or of the wrong shape, the temperature is missing, or
+        the motion of a nonlinear model grows without bound.
     ModelError
         If an ``arx`` core holds at a lower rate than the record's.
 
     Notes
     -----
-    The reference is taken as band-limited, and the response is the exact convolution with it from
-    rest, by the numerical Laplace transform: with damped samples :math:`a_n e^{-\sigma n T}` and
-    the transfer function on the line :math:`\sigma + j\omega`, the product of the two transforms
-    has no wrap-around and needs no discretisation of the derivative of order :math:`\nu`
-    (D. J. Wilcox, *Int. J. Elect. Eng. Educ.* 15 (1978) 247-265). O(n log n).
+    See `AxisSimulator`.
     """
     values = np.asarray(reference, float)
     single = values.ndim == 1
@@ -57,97 +63,192 @@ def simulate(model, reference, sampling_rate_hz, axis=None, initial="rest"):
         values[:, column] = reference
     if values.ndim != 2 or values.shape[1] != 3 or not len(values):
         raise FracAccelError(f"reference: shape {np.shape(reference)} given, expected (n, 3)")
-    if not np.isfinite(values).all():
-        first = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
-        raise FracAccelError(f"reference: sample {first} is not finite")
-    if not np.isfinite(sampling_rate_hz) or sampling_rate_hz <= 0:
-        raise FracAccelError(f"sampling_rate_hz: {sampling_rate_hz} given, expected above 0")
-    if initial not in ("rest", "steady"):
-        raise FracAccelError(f"initial: {initial!r} given, expected rest or steady")
     result = np.empty_like(values)
     for i, axis_model in enumerate(model.axes):
-        result[:, i] = _respond(axis_model, values[:, i], sampling_rate_hz, initial)
-    result = model.apply_sample_effects(result)
+        simulator = AxisSimulator(values[:, i], sampling_rate_hz, temperature_c, initial=initial)
+        result[:, i] = simulator.respond(axis_model)
+    result = model.apply_sample_effects(result, simulator.circumstances)
     return result[:, column] if single else result
 
 
-def _respond(model, reference, rate, initial):
-    """Composite linear response of one axis, pure delay included."""
-    core = model.effective_core
-    if isinstance(core, Arx) and rate > core.sampling_rate_hz * (1 + 1e-6):
-        raise ModelError(f"core.sampling_rate_hz: the model holds at {core.sampling_rate_hz:g} Hz, "
-                         f"the record has {rate:g} Hz")
-    level = reference[0] if initial == "steady" else 0.0
-    moving = reference - level
-    result = np.full(len(reference), level * static_gain(model) if level else 0.0)
-    if moving.any():
-        convolution = Convolution(moving, rate, abs(model.delay_s))
-        s = convolution.s
-        result += convolution.response(model.transfer_function(s) * np.exp(-s * model.delay_s))
-    return result
-
-
-class Convolution:
-    """Responses of linear systems to one input, each from rest before the first sample.
+class AxisSimulator:
+    """Simulates models of one axis again and again on the same reference.
 
     Parameters
     ----------
-    values : ndarray, shape (n,)
-        Input.
-    rate : float
-        Its sampling rate [Hz].
-    memory_s : float
-        Time [s] by which a response may come before its cause (a negative delay), which needs
-        room.
+    reference : array_like, shape (n,)
+        Acceleration [m/s²] at uniform instants.
+    sampling_rate_hz : float
+    temperature_c : array_like, shape (n,) or (), optional
+        Temperature [°C].
+    start_time_s : float
+        Time [s] from the record's start to the first sample: drifts, tones and skewed clocks count
+        from there.
+    initial : {"steady", "rest"}
+        Motion before the first sample: its value for ever (gravity), or none.
+
+    Attributes
+    ----------
+    circumstances : Circumstances
+        Times and temperatures of the samples.
+
+    Notes
+    -----
+    The linear part is the exact convolution with the band-limited reference (`Convolution`). What
+    a nonlinear spring does comes on top as a deviation, which the modes of the oscillator
+    follow step by step between the samples (`core.nonlinear_motion`), and which then passes
+    through the links behind the core. As in a sampled record, harmonics above the Nyquist
+    frequency fold back.
     """
 
-    def __init__(self, values, rate, memory_s=0.0):
+    def __init__(self, reference, sampling_rate_hz, temperature_c=None, start_time_s=0.0,
+                 initial="steady"):
+        values = np.asarray(reference, float)
+        if values.ndim != 1 or not len(values):
+            raise FracAccelError(f"reference: shape {values.shape} given, expected (n,)")
+        if not np.isfinite(values).all():
+            first = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise FracAccelError(f"reference: sample {first} is not finite")
+        if not np.isfinite(sampling_rate_hz) or sampling_rate_hz <= 0:
+            raise FracAccelError(f"sampling_rate_hz: {sampling_rate_hz} given, expected above 0")
+        if initial not in ("rest", "steady"):
+            raise FracAccelError(f"initial: {initial!r} given, expected rest or steady")
+        self._rate = float(sampling_rate_hz)
         self._n = len(values)
-        self._length = _fast_length(2 * self._n + int(np.ceil(memory_s * rate)))
-        sigma = _DAMPING / self._length
-        self._damping = np.exp(-sigma * np.arange(self._n))
-        self._s = (sigma + 2j * np.pi * np.arange(self._length // 2 + 1) / self._length) * rate
-        self._spectrum = rfft(values * self._damping, self._length)
+        self._level = values[0] if initial == "steady" else 0.0
+        self._moving = values - self._level
+        self._still = not self._moving.any()
+        self._start_time_s = start_time_s
+        self._convolution, self._room_s = None, 0.0
+        self.circumstances = Circumstances(start_time_s + np.arange(self._n) / self._rate,
+                                           _temperature(temperature_c, self._n))
 
-    @property
-    def s(self):
-        """Complex frequencies [rad/s] on which a transfer function is needed."""
-        return self._s
+    def simulate(self, axis_model):
+        """Output of an `AxisModel`, without the cross-axis part.
 
-    def response(self, transfer):
-        """Responses of systems, shape (..., n), from their transfer functions (...) at `s`."""
-        spectrum = self._spectrum * _smooth_at_nyquist(transfer)
-        return irfft(spectrum, self._length)[..., :self._n] / self._damping
+        Returns
+        -------
+        ndarray, shape (n,)
 
+        Raises
+        ------
+        FracAccelError, ModelError
+            As `simulate`.
+        """
+        values = self.respond(axis_model)
+        for effect in axis_model.effects:
+            values = effect.simulate(values, self.circumstances)
+        return values
 
-def _smooth_at_nyquist(response):
-    """Turn the phase towards a multiple of pi in the last fifth below the Nyquist frequency.
+    def respond(self, axis_model):
+        """Output of the core and its links, delay and clock: before the effects on the samples."""
+        core = axis_model.effective_core
+        if isinstance(core, Arx) and self._rate > core.sampling_rate_hz * (1 + 1e-6):
+            raise ModelError(f"core.sampling_rate_hz: the model holds at {core.sampling_rate_hz:g} "
+                             f"Hz, the record has {self._rate:g} Hz")
+        ratio = axis_model.clock_ratio
+        # what the clock is off already at the start is a delay like any other
+        delay_s = axis_model.delay_s - (ratio - 1) * self._start_time_s
+        result = self._linear(axis_model, delay_s, ratio)
+        force = axis_model.static_force
+        if force and not (self._still and not self._level):
+            result += self._deviation(axis_model, force, delay_s, ratio)
+        return result
 
-    Anything else there jumps to its conjugate, and the jump rings through the record from both its
-    ends with an amplitude that falls only as 1/n.
-    """
-    first = int(0.8 * response.shape[-1])
-    ramp = np.linspace(0, 1, response.shape[-1] - first)
-    angle = np.angle(response[..., -1:])
-    excess = angle - np.round(angle / np.pi) * np.pi
-    smooth = response.copy()
-    smooth[..., first:] *= np.exp(-1j * excess * ramp * ramp * (3 - 2 * ramp))
-    return smooth
+    def _linear(self, model, delay_s, ratio):
+        level = self._level * static_gain(model) if self._level else 0.0
+        if self._still:
+            return np.full(self._n, level)
+        convolution = self._prepared(delay_s)
+        transfer = model.transfer_function(convolution.s)
+        if delay_s:
+            transfer *= np.exp(-convolution.s * delay_s)
+        if ratio == 1:
+            return convolution.response(transfer) + level
+        position = ratio * np.arange(self._n)
+        count = int(max(position[-1], self._n)) + _BEYOND
+        fine = convolution.response_between(transfer, _REFINED, _REFINED * count)
+        return at_positions(fine, _REFINED * position) + level
+
+    def _deviation(self, model, force, delay_s, ratio):
+        """What the spring's force beyond its linear part adds."""
+        try:
+            from .core import nonlinear_motion
+        except ImportError as error:
+            raise FracAccelError(f"a model with a nonlinear spring or friction needs numba to be "
+                                 f"simulated: pip install numba ({error})") from None
+        from .core.modes import modes_of
+        core = model.effective_core
+        natural = 2 * np.pi * core.natural_frequency_hz
+        most = min(core.natural_frequency_hz / self._rate * _STEPS_PER_PERIOD,
+                   _MOST_STEPS_PER_SAMPLE)
+        steps = max(_STEPS_PER_SAMPLE, int(np.ceil(most)))
+        position = ratio * np.arange(self._n) - delay_s * self._rate
+        count = int(max(position[-1], self._n)) + _BEYOND
+        convolution = self._prepared(delay_s)
+        links = [effect for effect in model.dynamics[1:] if effect.stage < CORE]
+        transfer = _product([core, *links], convolution.s)
+        load = self._level * core.sensitivity
+        motion = []
+        for _ in range(nonlinear_motion.derivatives_needed(force) + 1):
+            motion.append(convolution.response_between(transfer, steps, steps * count))
+            transfer = transfer * (convolution.s / natural)
+        motion[0] += load
+        modes = modes_of(core, self._rate / count, natural + np.pi * self._rate * steps)
+        start = force.equilibrium(load) - load
+        deviation = nonlinear_motion.deviation(
+            modes, force, natural / (self._rate * steps), np.array(motion), start)
+        if not np.isfinite(deviation[-1]):
+            raise FracAccelError("the model's motion grows without bound: its nonlinear terms are "
+                                 "too large for this record")
+        behind = [effect for effect in model.dynamics[1:] if effect.stage > CORE]
+        moving = deviation - start
+        filtering = [effect for effect in behind if effect.stage < GAIN]
+        if filtering:
+            conditioner = Convolution(moving, self._rate * steps)
+            moving = conditioner.response(_product(filtering, conditioner.s))
+        gain = _product([effect for effect in behind if effect.stage >= GAIN], np.array([1j]))
+        start *= _static_gain(lambda s: _product(filtering, s)) if start else 0.0
+        if delay_s or ratio != 1:
+            moving = at_positions(moving, steps * position)
+        else:
+            moving = moving[:steps * self._n:steps]
+        return gain[0].real * (moving + start)
+
+    def _prepared(self, delay_s):
+        """Convolution with room for a delay."""
+        if self._convolution is None or abs(delay_s) > self._room_s:
+            self._room_s = max(abs(delay_s), 64 / self._rate)
+            self._convolution = Convolution(self._moving, self._rate, self._room_s)
+        return self._convolution
 
 
 def static_gain(model):
     """Response to a constant acceleration [output units per m/s²]; 0 behind a high-pass."""
+    return _static_gain(model.transfer_function)
+
+
+def _static_gain(transfer):
     # the limit, since orders below zero and high-passes make s = 0 itself undefined
-    gain = model.transfer_function(np.array([1e-9 + 0j]))[0]
-    return float(gain.real) if np.isfinite(gain) and abs(gain) > 1e-6 * _reference_gain(model) \
-        else 0.0
+    gain = transfer(np.array([1e-9 + 0j]))[0]
+    size = np.abs(transfer(2j * np.pi * np.geomspace(1e-3, 1e5, 200)))
+    largest = np.max(size[np.isfinite(size)], initial=0.0)
+    return float(gain.real) if np.isfinite(gain) and abs(gain) > 1e-6 * largest else 0.0
 
 
-def _reference_gain(model):
-    gain = np.abs(model.transfer_function(2j * np.pi * np.geomspace(1e-3, 1e5, 200)))
-    return np.max(gain[np.isfinite(gain)], initial=0.0)
+def _product(links, s):
+    """Composite transfer function of some links."""
+    total = np.ones(len(s), complex)
+    for link in links:
+        total *= link.transfer_function(s)
+    return total
 
 
-def _fast_length(n):
-    """Even length of at least `n` that the transform is fast at."""
-    return 2 * next_fast_len((n + 1) // 2, real=True)
+def _temperature(values, n):
+    if values is None:
+        return None
+    values = np.asarray(values, float)
+    if values.shape not in ((), (n,)) or not np.isfinite(values).all():
+        raise FracAccelError(f"temperature_c: shape {values.shape} given, expected one finite "
+                             f"number or {n} of them")
+    return np.broadcast_to(values, n)

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from .correction import Corrector
-from .correction.design import reference_gain
+from .correction.design import plateau
 from .errors import FracAccelError
 from .identification.excitation import excited_band
 from .metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
@@ -13,6 +13,9 @@ from .model import AXES
 from .pair import clean, make_pair
 from .samples import Samples
 from .simulation import simulate
+
+# A stamp that has been moved by a skew and back.
+_ROUNDING_NS = 2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,7 +68,7 @@ class Validation:
                 "filters": self.filters, "counters": self.counters}
 
 
-def validate(reference, sensor, model, axis="x", **wishes):
+def validate(reference, sensor, model, axis="x", temperature_at=None, **wishes):
     """Judge a model on a measured pair.
 
     Parameters
@@ -73,6 +76,9 @@ def validate(reference, sensor, model, axis="x", **wishes):
     reference, sensor : Samples
     model : SensorModel
     axis : {"x", "y", "z"}
+    temperature_at : callable, optional
+        Temperature [°C] at an array of stamps [ns]; needed by a model with
+        temperature_sensitivity.
     **wishes
         ``sample_rate_hz``, ``bandwidth_hz``, ``max_delay_s``, ``lowest_hz`` as for `Corrector`.
 
@@ -87,8 +93,7 @@ def validate(reference, sensor, model, axis="x", **wishes):
     """
     pair = make_pair(reference, sensor, axis)
     corrector = Corrector(model, **wishes)
-    parts = [corrector.process(sensor.stamps_ns, sensor.values, sensor.variance),
-             corrector.finish()]
+    parts = [*_corrected(corrector, sensor, temperature_at), corrector.finish()]
     stamps, values = (np.concatenate([getattr(part, name) for part in parts])
                       for name in ("stamps_ns", "values"))
     if not len(stamps):
@@ -97,7 +102,7 @@ def validate(reference, sensor, model, axis="x", **wishes):
     comparison = compare(reference, sensor, Samples.of(stamps, values), corrector.design, axis)
     bands = [band.band_hz for band in comparison.corrected.bands]
     return Validation(
-        simulation=error_metrics(*_simulated(model, pair, AXES.index(axis)),
+        simulation=error_metrics(*_simulated(model, pair, AXES.index(axis), temperature_at),
                                  pair.sampling_rate_hz, bands),
         comparison=comparison, filters=corrector.design.summary(), counters=corrector.counters)
 
@@ -125,13 +130,18 @@ def compare(reference, sensor, corrected, design, axis="x"):
     pair = make_pair(reference, sensor, axis)
     rate = pair.sampling_rate_hz
     known = clean(reference)
-    # the raw sample of a corrected one still has the sensor's delay in its stamp
+    # the raw sample of a corrected one still has the sensor's delay and skew in its stamp
     raw_stamps = corrected.stamps_ns + design.sensor_delay_ns
-    place = np.minimum(np.searchsorted(sensor.stamps_ns, raw_stamps), len(sensor.stamps_ns) - 1)
+    since_start = raw_stamps - sensor.stamps_ns[0]
+    skew = 1 / design.model.axes[0].clock_ratio - 1
+    raw_stamps = raw_stamps + np.round(skew * since_start).astype(np.int64)
+    place = np.minimum(np.searchsorted(sensor.stamps_ns, raw_stamps - _ROUNDING_NS),
+                       len(sensor.stamps_ns) - 1)
     truth = interpolate(*known, corrected.stamps_ns, rate)[:, column]
     truth_raw = interpolate(*known, raw_stamps, rate)[:, column]
     run = _longest_run(np.isfinite(truth) & np.isfinite(truth_raw)
-                       & (sensor.stamps_ns[place] == raw_stamps), corrected.stamps_ns, rate)
+                       & (np.abs(sensor.stamps_ns[place] - raw_stamps) <= _ROUNDING_NS),
+                       corrected.stamps_ns, rate)
     truth, truth_raw, stamps = truth[run], truth_raw[run], corrected.stamps_ns[run]
     raw, after = sensor.values[place[run], column], corrected.values[run, column]
     low, high = excited_band(pair.reference[:, column], pair.sensor[:, column], rate)
@@ -141,7 +151,7 @@ def compare(reference, sensor, corrected, design, axis="x"):
         raise FracAccelError("the reference has no power in the band of the correction, "
                              f"{band[0]:.4g} Hz to {band[1]:.4g} Hz")
     bands = octave_bands(low, high)
-    scaled = raw / plateau(design.model.axis(axis))
+    scaled = raw / plateau(design.model.axis(axis), design.model.band_hz)
     return Comparison(
         raw=error_metrics(truth_raw, raw, rate, bands),
         scaled=error_metrics(truth_raw, scaled, rate, bands),
@@ -149,21 +159,32 @@ def compare(reference, sensor, corrected, design, axis="x"):
         stamps_ns=stamps, reference=truth, before=scaled, after=after)
 
 
-def _simulated(model, pair, column):
+def _corrected(corrector, sensor, temperature_at):
+    """Parts of the corrected record; the temperature follows the stamps once a second."""
+    step = len(sensor.stamps_ns)
+    if temperature_at is not None:
+        step = max(1, round(step / max(1.0, 1e-9 * np.ptp(sensor.stamps_ns))))
+    for start in range(0, len(sensor.stamps_ns), step):
+        stamps, values, variance = (column[start:start + step] for column in sensor[:3])
+        if temperature_at is not None:
+            corrector.set_temperature(float(temperature_at(stamps).mean()))
+        yield corrector.process(stamps, values, variance)
+
+
+def _simulated(model, pair, column, temperature_at):
     """Measured and simulated output at the same instants."""
-    simulated = simulate(model, pair.reference, pair.sampling_rate_hz, initial="steady")
+    temperature = None
+    if temperature_at is not None:
+        temperature = temperature_at(
+            pair.start_ns + np.arange(len(pair)) * 1e9 / pair.sampling_rate_hz)
+    simulated = simulate(model, pair.reference, pair.sampling_rate_hz, initial="steady",
+                         temperature_c=temperature)
     at = np.arange(len(pair)) / pair.sampling_rate_hz
     instants = np.round(1e9 * at).astype(np.int64)
     shifted = interpolate(instants, simulated, instants + round(1e9 * pair.lag_s),
                           pair.sampling_rate_hz)[:, column]
     run = _longest_run(np.isfinite(shifted) & pair.valid, instants, pair.sampling_rate_hz)
     return pair.sensor[run, column], shifted[run]
-
-
-def plateau(axis):
-    """Gain of an axis on its plateau, with its polarity."""
-    core = axis.effective_core
-    return reference_gain(axis) * np.sign(getattr(core, "sensitivity", 1.0))
 
 
 def _longest_run(good, stamps_ns, rate):

@@ -12,6 +12,7 @@ from random_models import draw_sensor, model_of
 
 from frac_accel import Corrector
 from frac_accel.correction.design import reference_gain
+from frac_accel.effects import Circumstances
 from frac_accel.metrics import error_metrics, interpolate
 
 RATE = 2000.0
@@ -42,7 +43,8 @@ def errors(sensor, corrector, record, band):
     usable = np.isfinite(reference).all(axis=1)
     model = model_of(sensor)
     shift = round(model.axes[0].delay_s * RATE)
-    raw = (record.sensor - model.apply_sample_effects(np.zeros((1, 3))))[shift:]
+    offset = model.apply_sample_effects(np.zeros((1, 3)), Circumstances.at_rest(1))
+    raw = (record.sensor - offset)[shift:]
     raw_reference = record.reference[:len(raw)]
     result = []
     for axis in range(3):

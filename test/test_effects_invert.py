@@ -6,7 +6,7 @@ import rig
 from random_models import model_of
 
 from frac_accel import Corrector, simulate
-from frac_accel.effects import known_effects
+from frac_accel.effects import Circumstances, known_effects
 from frac_accel.errors import FracAccelError
 from frac_accel.metrics import interpolate
 from frac_accel.model import SensorModel
@@ -15,15 +15,19 @@ RATE = 1000.0
 LINEAR = ("sensitivity_error", "time_delay", "ac_coupling", "low_pass_lag", "mounting_resonance",
           "fractional_damping")
 ON_SAMPLES = ("offset", "cross_axis_sensitivity")
+NONLINEAR = ("cubic_stiffness", "quadratic_stiffness", "coulomb_friction", "hysteresis")
+CORE = ("core_parameter_shift",)
+IN_TIME = ("clock_skew", "gain_drift", "temperature_sensitivity", "tone_interference")
+LOSSY = ("clipping", "dead_zone", "quantization", "dropped_samples", "timestamp_jitter")
 
 
 def test_every_effect_of_this_package_is_tested_here():
     ours = {cause for cause, effect in known_effects().items()
             if effect.__module__.startswith("frac_accel.")}
-    assert ours == {*LINEAR, *ON_SAMPLES}
+    assert ours == {*LINEAR, *ON_SAMPLES, *NONLINEAR, *CORE, *IN_TIME, *LOSSY}
 
 
-@pytest.mark.parametrize("cause", [*LINEAR, *ON_SAMPLES])
+@pytest.mark.parametrize("cause", rig.CAUSES)
 def test_effect_explains_itself(cause):
     effect = known_effects()[cause]
     assert effect.cause == cause
@@ -37,9 +41,10 @@ def test_sample_effects_are_undone_to_rounding(seed):
     model = model_of(rig.Sensor(sensor.core, sensor.effects, {"y": {"effects": {
         "offset": {"offset": 3.0}}}}))
     values = rng.normal(size=(500, 3))
-    affected = model.apply_sample_effects(values)
+    affected = model.apply_sample_effects(values, Circumstances.at_rest(500))
     assert np.max(np.abs(affected - values)) > 0.01
-    np.testing.assert_allclose(model.remove_sample_effects(affected), values, atol=1e-13)
+    restored, _ = model.remove_sample_effects(affected, Circumstances.at_rest(500))
+    np.testing.assert_allclose(restored, values, atol=1e-13)
 
 
 def test_sample_effects_by_hand():
@@ -48,14 +53,15 @@ def test_sample_effects_by_hand():
         "core": {"natural_frequency_hz": 100.0, "damping_ratio": 0.5},
         "axes": {"x": {"effects": [{"cause": "cross_axis_sensitivity", "y": 0.02, "z": -0.01},
                                    {"cause": "offset", "offset": 0.5}]}}})
-    np.testing.assert_allclose(model.apply_sample_effects(np.array([[1.0, 10.0, 100.0]])),
-                               [[1.0 + 0.2 - 1.0 + 0.5, 10.0, 100.0]])
+    affected = model.apply_sample_effects(np.array([[1.0, 10.0, 100.0]]), Circumstances.at_rest(1))
+    np.testing.assert_allclose(affected, [[1.0 + 0.2 - 1.0 + 0.5, 10.0, 100.0]])
 
 
 def test_input_is_left_as_it_was():
     model = model_of(rig.draw_sensor(np.random.default_rng(0), RATE, "classical", ON_SAMPLES))
     values = np.ones((5, 3))
-    model.remove_sample_effects(model.apply_sample_effects(values))
+    there = Circumstances.at_rest(5)
+    model.remove_sample_effects(model.apply_sample_effects(values, there), there)
     np.testing.assert_array_equal(values, np.ones((5, 3)))
 
 
@@ -87,4 +93,4 @@ def test_cross_axis_that_makes_the_axes_one_is_refused():
         "core": {"natural_frequency_hz": 100.0, "damping_ratio": 0.5},
         "effects": [{"cause": "cross_axis_sensitivity", "x": 1.0, "y": 1.0, "z": 1.0}]})
     with pytest.raises(FracAccelError, match="cross_axis_sensitivity"):
-        model.remove_sample_effects(np.zeros((2, 3)))
+        model.remove_sample_effects(np.zeros((2, 3)), Circumstances.at_rest(2))

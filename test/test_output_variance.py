@@ -6,6 +6,7 @@ import rig
 from random_models import draw_sensor, model_of
 
 from frac_accel import Corrector, simulate
+from frac_accel.effects import Circumstances
 from frac_accel.metrics import interpolate
 from frac_accel.model import SensorModel
 
@@ -24,7 +25,8 @@ def test_white_noise_alone(seed):
     std = 10 ** rng.uniform(-3, 0, 3)
     kernel = Corrector(model, RATE)
     n = 60_000
-    values = model.apply_sample_effects(np.zeros((n, 3))) + rng.normal(size=(n, 3)) * std
+    values = model.apply_sample_effects(np.zeros((n, 3)), Circumstances.at_rest(n))
+    values = values + rng.normal(size=(n, 3)) * std
     result = kernel.process(stamps_of(n), values, np.tile(std**2, (n, 1)))
     late = slice(20_000, None)
     for axis, design in enumerate(kernel.design.axes):

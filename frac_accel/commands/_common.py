@@ -7,11 +7,13 @@ import math
 import sys
 from pathlib import Path
 
+import numpy as np
 from tqdm import tqdm
 
-from ..bag import RAW_TOPIC, REFERENCE_TOPIC, BagReader
+from ..bag import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC, BagReader
 from ..errors import BagError, FracAccelError
 from ..parameters import plain
+from ..report import require_plotly
 
 
 def add_bag(parser):
@@ -33,6 +35,32 @@ def add_topics(parser, axis=True):
     if axis:
         parser.add_argument("--axis", default="x", choices=list("xyz"),
                             help="axis that is judged (default: %(default)s)")
+
+
+def add_temperature(parser):
+    """Which topic holds the temperature."""
+    parser.add_argument("--temperature", default=TEMPERATURE_TOPIC, metavar="TOPIC",
+                        help="topic of the sensor's temperature, which a model with "
+                             "temperature_sensitivity needs (default: %(default)s)")
+
+
+def read_temperature_at(reader, topic):
+    """Function that gives the temperature [°C] at stamps [ns], interpolated, held at the ends.
+
+    Raises
+    ------
+    BagError
+        If the bag has no such topic, or nothing usable on it.
+    """
+    blocks = list(reader.temperatures(topic))
+    stamps, celsius = (np.concatenate([np.empty(0), *(getattr(block, name) for block in blocks)])
+                       for name in ("stamps_ns", "celsius"))
+    usable = np.isfinite(celsius)
+    if not usable.any():
+        raise BagError(f"{reader.path}: topic {topic} has no usable temperature")
+    order = np.argsort(stamps[usable], kind="stable")
+    stamps, celsius = stamps[usable][order], celsius[usable][order]
+    return lambda stamps_ns: np.interp(stamps_ns, stamps, celsius)
 
 
 def add_filter(parser):
@@ -59,6 +87,12 @@ def filter_wishes(arguments):
 def add_json(parser):
     """Machine-readable result."""
     parser.add_argument("--json", metavar="FILE", help="also write the result as JSON")
+
+
+def add_report(parser):
+    """Result as a page."""
+    parser.add_argument("--report", metavar="R.html",
+                        help="also write the result as one HTML page with interactive figures")
 
 
 def positive(text):
@@ -99,6 +133,13 @@ def require_output(path, *inputs):
             raise BagError(f"{path}: is the input, expected another file for the output")
     if not path.absolute().parent.is_dir():
         raise BagError(f"{path}: the folder {path.absolute().parent} does not exist")
+
+
+def require_report(path, *inputs):
+    """Refuse a report that could not be written, before the work that it is to tell of."""
+    if path is not None:
+        require_output(path, *inputs)
+        require_plotly()
 
 
 def progress(total, unit="msg"):

@@ -17,6 +17,7 @@ from ._common import (
     add_filter,
     add_json,
     add_model,
+    add_temperature,
     add_topics,
     filter_wishes,
     open_bag,
@@ -32,6 +33,7 @@ def add_arguments(parser):
     add_model(parser)
     parser.add_argument("-o", "--output", required=True, metavar="OUT.mcap", help="bag to write")
     add_topics(parser, axis=False)
+    add_temperature(parser)
     parser.add_argument("--corrected", default=CORRECTED_TOPIC, metavar="TOPIC",
                         help="topic of the corrected samples (default: %(default)s)")
     add_filter(parser)
@@ -46,13 +48,14 @@ def run(arguments):
     raw = reader.topic(arguments.sensor, cdr.ACCELERATION_TYPES)
     if not raw.count:
         raise BagError(f"{arguments.bag}: topic {arguments.sensor} has no messages")
+    temperatures = _temperatures(reader, arguments.temperature, corrector.model)
     copied = [raw.name] + [arguments.reference] * (arguments.reference in reader.topics)
     with BagWriter(arguments.output) as writer, \
             progress(sum(reader.topics[name].count for name in copied)) as bar:
         for name in copied:
             writer.copy_topic(reader.topics[name])
         writer.copy_topic(raw, arguments.corrected)
-        sink = _Sink(corrector, writer, raw.type_name, arguments.corrected)
+        sink = _Sink(corrector, writer, raw.type_name, arguments.corrected, temperatures)
         for block in reader.blocks(copied):
             times = list(zip(block.log_times_ns.tolist(), block.publish_times_ns.tolist()))
             for data, (log, publish) in zip(block.messages, times):
@@ -82,12 +85,23 @@ def run(arguments):
                                 "filters": summary, "warnings": reader.warnings})
 
 
+def _temperatures(reader, topic, model):
+    """Log times and temperatures [°C] of the bag, where the model needs them and there are any."""
+    if not model.needs_temperature or topic not in reader.topics:
+        return []
+    reader.topic(topic, [cdr.TEMPERATURE])
+    return [pair for block in reader.blocks([topic])
+            for pair in zip(block.log_times_ns.tolist(), block.temperatures().celsius.tolist())]
+
+
 def fates(counters):
     """What happened to samples that were not simply corrected, in words."""
     words = {"warm_up": "before the filter was full", "waiting": "after the last full filter",
              "cut_off": "before a long gap", "duplicates": "with a repeated stamp",
              "stamps_back": "with a stamp that goes back", "early": "too many by their stamps",
-             "not_finite": "not finite", "filled": "missing and bridged"}
+             "not_finite": "not finite", "filled": "missing and bridged",
+             "clipped": "at the limits of the range",
+             "without_temperature": "without a temperature (25 °C assumed)"}
     return ", ".join(f"{counters[name]} {text}" for name, text in words.items()
                      if counters.get(name))
 
@@ -95,8 +109,9 @@ def fates(counters):
 class _Sink:
     """Runs raw blocks through the corrector and writes what becomes ready."""
 
-    def __init__(self, corrector, writer, type_name, topic):
+    def __init__(self, corrector, writer, type_name, topic, temperatures):
         self._corrector, self._writer = corrector, writer
+        self._temperatures = collections.deque(temperatures)
         self._type, self._topic = type_name, topic
         self._waiting = collections.deque()
         self._first = 0
@@ -107,11 +122,25 @@ class _Sink:
             for data, log in zip(block.messages, block.log_times_ns.tolist()):
                 samples = cdr.read_point_cloud(data)
                 self._frame, self._log = samples.frame_id, log
+                self._tell_temperature(log)
                 self._write_cloud(self._corrector.process(samples.stamps_ns, samples.values))
             return
         samples = block.samples()
         self._waiting.extend(zip(block.messages, block.log_times_ns.tolist()))
-        self._write(self._corrector.process(samples.stamps_ns, samples.values, samples.variance))
+        logs, start = block.log_times_ns, 0
+        while start < len(logs):
+            self._tell_temperature(logs[start])
+            stop = (int(np.searchsorted(logs, self._temperatures[0][0])) if self._temperatures
+                    else len(logs))
+            part = slice(start, max(stop, start + 1))
+            self._write(self._corrector.process(samples.stamps_ns[part], samples.values[part],
+                                                samples.variance[part]))
+            start = part.stop
+
+    def _tell_temperature(self, log_time_ns):
+        """Hand on the temperatures that had come by then, as they come to a node."""
+        while self._temperatures and self._temperatures[0][0] <= log_time_ns:
+            self._corrector.set_temperature(self._temperatures.popleft()[1])
 
     def finish(self):
         rest = self._corrector.finish()

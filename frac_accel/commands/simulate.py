@@ -14,9 +14,11 @@ from ._common import (
     add_bag,
     add_json,
     add_model,
+    add_temperature,
     add_topics,
     open_bag,
     progress,
+    read_temperature_at,
     require_output,
     write_json,
 )
@@ -28,6 +30,7 @@ def add_arguments(parser):
     add_model(parser)
     parser.add_argument("-o", "--output", required=True, metavar="OUT.mcap", help="bag to write")
     add_topics(parser, axis=False)
+    add_temperature(parser)
     parser.add_argument("--initial", choices=["rest", "steady"], default="rest",
                         help="motion before the record: none, or the first sample's value for "
                              "ever, as gravity (default: %(default)s)")
@@ -43,8 +46,12 @@ def run(arguments):
     samples = [block for _, block in reader.samples([arguments.reference])]
     samples = cdr.Samples.concatenate(samples) if samples else None
     record = uniform(samples, f"{arguments.bag}: topic {arguments.reference}")
-    simulated = simulate(model, record.values, record.sampling_rate_hz,
-                         initial=arguments.initial)[record.slot]
+    grid_ns = samples.stamps_ns[record.index[0]] + (
+        np.arange(len(record.values)) * 1e9 / record.sampling_rate_hz)
+    simulated = simulate(
+        model, record.values, record.sampling_rate_hz, initial=arguments.initial,
+        temperature_c=(read_temperature_at(reader, arguments.temperature)(grid_ns)
+                       if model.needs_temperature else None))[record.slot]
     result = cdr.Samples.of(samples.stamps_ns[record.index], simulated,
                             np.full(simulated.shape, model.noise_std**2) if model.noise_std else
                             None, samples.frame_id)

@@ -9,9 +9,11 @@ from ._common import (
     add_filter,
     add_json,
     add_model,
+    add_temperature,
     add_topics,
     filter_wishes,
     open_bag,
+    read_temperature_at,
     write_json,
 )
 
@@ -23,6 +25,7 @@ def add_arguments(parser):
     add_bag(parser)
     add_model(parser)
     add_topics(parser)
+    add_temperature(parser)
     add_filter(parser)
     add_json(parser)
 
@@ -30,11 +33,14 @@ def add_arguments(parser):
 def run(arguments):
     """Do it."""
     model = SensorModel.load(arguments.model)
-    open_bag(arguments.bag)
+    reader = open_bag(arguments.bag)
+    temperature = None
+    if model.needs_temperature:
+        temperature = read_temperature_at(reader, arguments.temperature)
     topics = read_bag(arguments.bag, [arguments.reference, arguments.sensor])
     try:
         result = validate(topics[arguments.reference], topics[arguments.sensor], model,
-                          arguments.axis, **filter_wishes(arguments))
+                          arguments.axis, temperature_at=temperature, **filter_wishes(arguments))
     except FracAccelError as error:
         raise type(error)(f"{arguments.bag}: {error}") from None
     print(table(result, arguments.axis))

@@ -1,5 +1,7 @@
 """Correction of raw samples, for node and command alike."""
 
+import numpy as np
+
 from .design import design_inverse
 from .stream import Stream
 
@@ -32,5 +34,38 @@ class Corrector(Stream):
     def _design(self, model, sample_rate_hz, **wishes):
         return design_inverse(model, sample_rate_hz, **wishes)
 
-    def _before(self, values):
-        return self._model.remove_sample_effects(values)
+    def _count(self, values):
+        found = {}
+        if self._clips:
+            found["clipped"] = int(self._is_clipped(values).any(axis=1).sum())
+        if self._model.needs_temperature and not self._temperature.is_known:
+            found["without_temperature"] = len(values)
+        for name, count in found.items():
+            self._totals[name] = self._totals.get(name, 0) + count
+
+    @property
+    def _clips(self):
+        return bool(np.isfinite(self._model.limits).any())
+
+    def _begin(self):
+        super()._begin()
+        self._inverse = self._model.live_inverse(self.sample_rate_hz)
+        self._skew = self._model.axes[0].clock_ratio - 1
+
+    def _before(self, values, variance, index, stamps_ns):
+        if self._clips:
+            # of a clipped sample no more is known than that it is beyond the limit
+            low, high = self._model.limits
+            variance = np.where(self._is_clipped(values), ((high - low) / 2)**2, variance)
+        return self._inverse(values, variance, self._circumstances(index, stamps_ns))
+
+    def _stamps(self, stamps_ns):
+        """Instants that the samples with these stamps show."""
+        if self._skew:
+            since_start = stamps_ns - self._record_start_ns
+            stamps_ns = stamps_ns + np.round(self._skew * since_start).astype(np.int64)
+        return stamps_ns - self.design.sensor_delay_ns
+
+    def _is_clipped(self, values):
+        low, high = self._model.limits
+        return (values <= low) | (values >= high)

@@ -5,10 +5,12 @@ import functools
 
 import numpy as np
 
-from ..core import Arx
+from ..core import Arx, Oscillator
+from ..effects import Circumstances
 from ..errors import DesignError, FracAccelError
 from ..model import AXES
 from .fitting import LOWEST_SHARE, FilterProblem, evaluate
+from .static_terms import StaticTermsDesign
 
 # A band ends where the sensor's gain has fallen to this share of its reference gain: the inverse
 # multiplies the noise there by five. At the latest it ends at 0.6 of the Nyquist frequency.
@@ -18,6 +20,8 @@ NYQUIST_SHARE = 0.6
 TOLERANCE = 2e-3
 # Without a permitted delay: the shortest whose noise gain is this close to that of a brick wall.
 NOISE_EXCESS = 1.3
+# Ratio of a band's edges over which a plateau is looked for where the band begins at zero.
+_WIDEST = 1000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -30,6 +34,8 @@ class FilterDesign:
     sampling_rate_hz : float
     axes : tuple of DesignedFilter
         One for each of x, y, z.
+    static_terms : tuple of StaticTerms
+        What the nonlinear spring of each axis adds; None where it is linear.
     delay_samples : int
         An output belongs to the sample this many before the newest.
     sensor_delay_ns : int
@@ -39,13 +45,15 @@ class FilterDesign:
     model: object
     sampling_rate_hz: float
     axes: tuple
+    static_terms: tuple
     delay_samples: int
     sensor_delay_ns: int
 
     @property
     def warm_up_samples(self):
         """Number of samples after a start that cannot be estimated: the taps are not yet full."""
-        return max(axis.filter.lead + len(axis.filter.taps) for axis in self.axes) - 1
+        linear = max(axis.filter.lead + len(axis.filter.taps) for axis in self.axes) - 1
+        return max(linear, *(terms.warm_up_samples for terms in self.static_terms if terms), 0)
 
     def summary(self):
         """Plain numbers of the design, for reports and diagnostics."""
@@ -113,24 +121,50 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
                         ("lowest_hz", lowest_hz), ("tolerance", tolerance)):
         if value is not None:
             _positive(value, name)
-    model.remove_sample_effects(np.zeros((1, 3)))  # refuses those that cannot be undone
-    known = model.band_hz[1] if model.band_hz else np.inf
-    bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz, known)
+    model.remove_sample_effects(np.zeros((1, 3)), Circumstances.at_rest(1))  # refuses singular ones
+    ratio = _clock_ratio(model)
+    bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz, model.band_hz)
              for name, axis in zip(AXES, model.axes)]
     # stamps are whole nanoseconds; what is left of the delay is done by the filters
     sensor_delay_ns = int(np.ceil(max(axis.delay_s for axis in model.axes) * 1e9 - 1e-3))
 
+    # what the sensor's clock calls a second is `ratio` seconds
+    true_rate = rate / ratio
+
+    def late(axis):
+        return max(0.0, sensor_delay_ns * 1e-9 - axis.delay_s) * true_rate
+
     @functools.cache
     def problem(axis, band):
-        return FilterProblem(lambda s: 1 / axis.transfer_function(s), axis.zeros(), rate, band,
-                        max(0.0, sensor_delay_ns * 1e-9 - axis.delay_s) * rate)
+        return FilterProblem(lambda s: 1 / axis.transfer_function(s), axis.zeros(), true_rate, band,
+                             late(axis))
+
+    @functools.cache
+    def terms(axis, band):
+        return StaticTermsDesign(axis, true_rate, band, late(axis)) if axis.static_force else None
 
     problems = [problem(axis, band) for axis, band in zip(model.axes, bands)]
+    nonlinear = [terms(axis, band) for axis, band in zip(model.axes, bands)]
     delay = _choose_delay(list(dict.fromkeys(problems)), rate, max_delay_s, tolerance)
-    return FilterDesign(
-        model=model, sampling_rate_hz=rate,
-        axes=tuple(p.solve(delay, tolerance) for p in problems),
-        delay_samples=delay, sensor_delay_ns=sensor_delay_ns)
+    delay = _delay_with_terms(delay, nonlinear, rate, max_delay_s)
+
+    @functools.cache
+    def solved(own_problem, own_terms):
+        linear = own_problem.solve(delay, tolerance)
+        return linear, own_terms.solve(delay, linear) if own_terms else None
+
+    axes, static_terms = zip(*map(solved, problems, nonlinear))
+    return FilterDesign(model=model, sampling_rate_hz=rate, axes=axes, static_terms=static_terms,
+                        delay_samples=delay, sensor_delay_ns=sensor_delay_ns)
+
+
+def _delay_with_terms(delay, nonlinear, rate, max_delay_s):
+    """Delay [samples] that is long enough for the path of the nonlinear terms, too."""
+    least = max((terms.least_delay for terms in nonlinear if terms), default=0)
+    if max_delay_s is not None and least > max_delay_s * rate * (1 + 1e-9):
+        raise DesignError(f"the nonlinear terms need a delay of {_rounded_up(least / rate, 6)} s, "
+                          f"but max_delay_s is {max_delay_s:.3g} s")
+    return max(delay, least)
 
 
 def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
@@ -155,6 +189,10 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
         If the tolerance cannot be met.
     """
     rate = _positive(sampling_rate_hz, "sampling_rate_hz")
+    _clock_ratio(model)
+    if any(axis.static_force for axis in model.axes):
+        raise DesignError("a model with a nonlinear spring or friction cannot be played live; "
+                          "simulate it offline")
     # a sensor whose stamps are early (a negative delay) can only be played so much later
     wait = int(np.ceil(max(0.0, *(-axis.delay_s * rate for axis in model.axes))))
 
@@ -162,13 +200,22 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
     def problem(axis):
         return FilterProblem(axis.transfer_function, axis.poles(), rate,
                         (0.0, NYQUIST_SHARE * rate / 2), axis.delay_s * rate + wait,
-                        floor=0.01 * reference_gain(axis))
+                        floor=0.01 * reference_gain(axis, model.band_hz))
 
     problems = [problem(axis) for axis in model.axes]
     delay = _choose_delay(list(dict.fromkeys(problems)), rate, None, tolerance)
     return FilterDesign(model=model, sampling_rate_hz=rate,
                         axes=tuple(p.solve(delay, tolerance) for p in problems),
-                        delay_samples=delay + wait, sensor_delay_ns=0)
+                        static_terms=(None,) * 3, delay_samples=delay + wait, sensor_delay_ns=0)
+
+
+def _clock_ratio(model):
+    """Ratio of the sensor's clock, which is one for all axes."""
+    ratios = {axis.clock_ratio for axis in model.axes}
+    if len(ratios) > 1:
+        raise DesignError("effects: clock_skew differs between the axes, but a sample has one "
+                          "stamp for all of them")
+    return ratios.pop()
 
 
 def _choose_delay(problems, rate, max_delay_s, tolerance):
@@ -237,12 +284,12 @@ def _positive(value, name):
     return float(value)
 
 
-def _band(axis, name, rate, bandwidth_hz, lowest_hz, known_hz):
+def _band(axis, name, rate, bandwidth_hz, lowest_hz, known_band_hz):
     """Lowest and highest frequency [Hz] of the correction of one axis."""
     nyquist = rate / 2
     core = axis.effective_core
     top = min(nyquist, core.sampling_rate_hz / 2) if isinstance(core, Arx) else nyquist
-    reference = reference_gain(axis)
+    reference = reference_gain(axis, known_band_hz)
     if not reference > 0:
         raise DesignError(f"axis {name}: the model's gain is zero, there is nothing to invert")
     grid = np.geomspace(0.1 * LOWEST_SHARE * rate, NYQUIST_SHARE * top, 8000)
@@ -259,13 +306,44 @@ def _band(axis, name, rate, bandwidth_hz, lowest_hz, known_hz):
     last = first + (int(after[0]) if len(after) else len(grid) - first) - 1
     low = 0.0 if first == 0 else float(grid[first])
     low = low if lowest_hz is None else float(lowest_hz)
-    high = min(float(grid[last]), known_hz) if bandwidth_hz is None else float(bandwidth_hz)
+    known = known_band_hz[1] if known_band_hz else np.inf
+    high = min(float(grid[last]), known) if bandwidth_hz is None else float(bandwidth_hz)
     if low >= high:
         raise DesignError(f"axis {name}: the band from {low:.4g} Hz to {high:.4g} Hz is empty")
     return low, high
 
 
-def reference_gain(axis):
-    """Gain of an axis on its plateau [output units per m/s²]."""
-    links = (axis.effective_core, *axis.effects)
-    return float(np.prod([link.reference_gain() for link in links]))
+def plateau(axis, band_hz=None):
+    """Gain of an axis on its plateau, with its polarity [output units per m/s²].
+
+    An oscillator's plateau is known wherever it was identified. Another core means nothing outside
+    the band in which it was identified: its gain is the median over that band, octave by octave.
+
+    Parameters
+    ----------
+    axis : AxisModel
+    band_hz : sequence of float, optional
+        Band in which the model was identified.
+
+    Returns
+    -------
+    float
+    """
+    core = axis.effective_core
+    if isinstance(core, Oscillator):
+        own = core.sensitivity
+    elif band_hz is None:
+        # the polarity of the limit, since orders below zero leave s = 0 itself undefined
+        own = np.copysign(core.reference_gain(),
+                          core.transfer_function(np.array([1e-9 + 0j]))[0].real)
+    else:
+        low, high = band_hz
+        frequency = np.geomspace(max(low, high / _WIDEST), high, 500)
+        response = core.transfer_function(2j * np.pi * frequency)
+        own = np.copysign(np.median(np.abs(response)), np.median(response.real))
+    return float(own * np.prod([effect.reference_gain() for effect in axis.effects]))
+
+
+def reference_gain(axis, band_hz=None):
+    """Size of `plateau`."""
+    return abs(plateau(axis, band_hz))

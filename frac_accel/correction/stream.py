@@ -5,8 +5,11 @@ import dataclasses
 
 import numpy as np
 
+from ..effects import Circumstances
 from ..errors import FracAccelError
 from .filter import FilterState, ParallelFilter
+from .static_terms import StaticTermsState
+from .temperature import HeldTemperature
 from .timing import LARGEST, RATE_SAMPLES, SampleClock, estimate_rate
 
 # Samples kept for a change of model: the new filter starts with these behind it.
@@ -77,11 +80,18 @@ class Stream:
         self._held, self._held_count, self._advancing = [], 0, False
         self._samples = 0
         self._totals = dict.fromkeys(("given", "warm_up", "cut_off", "duplicates"), 0)
+        self._temperature = HeldTemperature()
+        self._record_start_ns = self._record_end_ns = None
         self._clock = None
         self._prepared = None
         self.design = None
         if sample_rate_hz:
             self._start(float(sample_rate_hz))
+
+    @property
+    def model(self):
+        """SensorModel in use."""
+        return self._model
 
     @property
     def sample_rate_hz(self):
@@ -142,12 +152,18 @@ class Stream:
                                  f"{values.shape}")
         # no noise has such a variance: it is not known
         variance = np.where((variance >= 0) & (variance < LARGEST), variance, np.nan)
+        self._count(values)
         index = np.arange(self._samples, self._samples + len(stamps))
         self._samples += len(stamps)
         if self._clock is not None:
             return self._filter(index, stamps, values, variance)
         self._hold(index, stamps, values, variance)
         return self._filter_held() if self._estimate(RATE_SAMPLES) else _concatenated([])
+
+    def set_temperature(self, celsius):
+        """Temperature [°C] of the sensor from the next sample on; held until the next value."""
+        if np.isfinite(celsius):
+            self._temperature.set(self._samples, float(celsius))
 
     def finish(self):
         """Filter what is still held because the stream ended before its rate was known.
@@ -221,13 +237,24 @@ class Stream:
         """FilterDesign for a model at a sampling rate."""
         raise NotImplementedError
 
-    def _before(self, values):
-        """What happens to the samples before the filters; shape (n, 3) in and out."""
-        return values
+    def _count(self, values):
+        """Count what is to be counted of incoming samples, shape (n, 3)."""
 
-    def _after(self, values):
+    def _before(self, values, variance, index, stamps_ns):
+        """What happens to the samples and their variance before the filters; (n, 3) each."""
+        return values, variance
+
+    def _after(self, values, index, stamps_ns):
         """What happens to the samples after the filters; shape (n, 3) in and out."""
         return values
+
+    def _stamps(self, stamps_ns):
+        """Stamps of the output from those of the samples that it belongs to."""
+        return stamps_ns
+
+    def _circumstances(self, index, stamps_ns):
+        return Circumstances(1e-9 * (stamps_ns - self._record_start_ns),
+                             self._temperature.at(index))
 
     def _hold(self, index, stamps, values, variance):
         """Keep samples until there are enough to tell the rate."""
@@ -270,9 +297,6 @@ class Stream:
         self.design = design
         if self._clock:
             self._clock.longest_gap = design.warm_up_samples
-        origin, unit = self._before(np.zeros((1, 3))), np.eye(3)
-        # variance of the samples that the filters get, from that of the input
-        self._spread = (self._before(unit) - origin)**2
         noise = self._model.noise_std if self._noise_std is None else self._noise_std
         self._noise_variance = np.broadcast_to(np.square(np.asarray(noise, float)), 3)
 
@@ -287,6 +311,7 @@ class Stream:
     def _filter(self, index, stamps, values, variance):
         parts = []
         for run in self._clock.sort(index, stamps, values, variance):
+            self._note_time(run.stamps_ns)
             if run.restart:
                 lost = int(np.sum(self._waiting_index >= 0))
                 given_up = "cut_off" if self._states else "warm_up"
@@ -296,6 +321,14 @@ class Stream:
             self._remember(run)
             parts.append(self._advance(run))
         return _concatenated(parts)
+
+    def _note_time(self, stamps_ns):
+        """Drifts count from the first sample, and go on where a clock has been set back."""
+        if self._record_start_ns is None:
+            self._record_start_ns = int(stamps_ns[0])
+        elif stamps_ns[0] < self._record_end_ns:
+            self._record_start_ns -= self._record_end_ns - int(stamps_ns[0])
+        self._record_end_ns = int(stamps_ns[-1])
 
     def _forget(self):
         self._history, self._history_length = collections.deque(), 0
@@ -310,14 +343,16 @@ class Stream:
         """Run the filters over samples that follow the ones before."""
         self._waiting_index = np.r_[self._waiting_index, run.index]
         self._waiting_stamps = np.r_[self._waiting_stamps, run.stamps_ns]
-        values = self._before(run.values)
         stated = ~np.isnan(run.variance)
-        known = np.where(stated, run.variance, self._noise_variance)
-        variance = sum(known[:, [axis]] * self._spread[axis] for axis in range(3))
+        # a bridged sample is as warm as the one after it
+        following = np.where(run.index < 0, len(run.index) - 1, np.arange(len(run.index)))
+        following = np.minimum.accumulate(following[::-1])[::-1]
+        values, variance = self._before(
+            run.values, np.where(stated, run.variance, self._noise_variance),
+            run.index[following], run.stamps_ns)
         noise_known = (stated | (self._noise_variance > 0)).all(axis=1)
         # a bridged sample's variance says nothing of the noise: the sample after it does
-        following = np.where(run.index < 0, len(run.index) - 1, np.arange(len(run.index)))
-        noise_known = noise_known[np.minimum.accumulate(following[::-1])[::-1]]
+        noise_known = noise_known[following]
         if self._states is None:
             if self._kept is not None:
                 values = np.concatenate([self._kept[0], values])
@@ -334,10 +369,10 @@ class Stream:
         """Bring the filters into the state that they have when their taps are first full."""
         self._kept = None
         self._states = []
-        axes = self.design.axes
+        filters = list(zip(self.design.axes, self.design.static_terms))
         # axes with the same filter run through it together
-        for design in dict.fromkeys(axes):
-            rows = [axis for axis in range(3) if axes[axis] is design]
+        for design, terms in dict.fromkeys(filters):
+            rows = [axis for axis in range(3) if filters[axis] == (design, terms)]
             columns = values[:, rows].T
             # behind a high-pass every steady motion leaves the output at rest
             level = np.zeros(len(rows)) if design.band_hz[0] else columns.mean(axis=1)
@@ -349,7 +384,11 @@ class Stream:
             noise.process(variance[:, rows].T)
             later = max(design.noise_gain**2 - head.sum(), 0.0)
             power = np.mean((columns - level[:, None])**2, axis=1)
-            self._states.append((rows, design.filter, state, noise, later, power))
+            static = None
+            if terms:
+                static = StaticTermsState(terms, columns.mean(axis=1) * (not terms.is_coupled))
+                static.process(columns, variance[:, rows].T)
+            self._states.append((rows, design.filter, state, noise, later, power, static))
         self._since_start = len(values)
         # the oldest of the waiting will have been passed over before the first output
         skipped = len(values) - self.design.delay_samples
@@ -362,11 +401,15 @@ class Stream:
         count = len(values)
         result, spread = np.empty((count, 3)), np.empty((count, 3))
         since = self._since_start + np.arange(1, count + 1)
-        for rows, parallel_filter, state, noise, later, power in self._states:
+        for rows, parallel_filter, state, noise, later, power, static in self._states:
             result[:, rows] = state.process(values[:, rows].T).T
             known = variance[:, rows].T
             history = parallel_filter.unknown_history(since)**2
             spread[:, rows] = (noise.process(known) + later * known + np.outer(power, history)).T
+            if static:
+                added, doubt = static.process(values[:, rows].T, known)
+                result[:, rows] += added.T
+                spread[:, rows] += doubt.T
         spread[~noise_known] = np.nan
         self._since_start += count
         index, stamps = self._waiting_index[:count], self._waiting_stamps[:count]
@@ -376,8 +419,9 @@ class Stream:
         if given.any():
             self._last_given = int(index[given][-1])
         self._totals["given"] += int(given.sum())
-        return Filtered(index[given], stamps[given] - self.design.sensor_delay_ns,
-                        self._after(result[given]), spread[given])
+        index, stamps = index[given], stamps[given]
+        return Filtered(index, self._stamps(stamps),
+                        self._after(result[given], index, stamps), spread[given])
 
 
 def _concatenated(parts):

@@ -10,9 +10,9 @@ import pkgutil
 from importlib.metadata import entry_points
 
 from ..errors import FracAccelError
-from .base import Effect
+from .base import Circumstances, Effect
 
-__all__ = ["Effect", "known_effects"]
+__all__ = ["Circumstances", "Effect", "known_effects"]
 
 
 @functools.cache

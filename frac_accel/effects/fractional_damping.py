@@ -2,10 +2,9 @@
 
 import dataclasses
 
-from ..core import Oscillator
-from ..errors import ModelError
 from ..parameters import parameter
-from .base import CORE, Effect
+from .base import CORE, Effect, require_oscillator
+from .fit_starts import Start
 
 
 @dataclasses.dataclass(frozen=True)
@@ -15,14 +14,22 @@ class FractionalDamping(Effect):
     cause = "fractional_damping"
     stage = CORE
     explanation = "The damping force follows a fractional derivative of the displacement."
+    experiment = ("Sweep from far below to far above the resonance: damping of another order "
+                  "turns the phase over decades, not at the resonance alone.")
 
     damping_order: float = parameter("1", above=0, below=2)
     damping_ratio: float = parameter("1", above=0, maximum=100)
 
     def change_core(self, core):
         """Raise ModelError where the core is not an oscillator."""
-        if not isinstance(core, Oscillator):
-            raise ModelError(f"effects: fractional_damping given with a core of type {core.type}, "
-                             "expected an oscillator")
-        return dataclasses.replace(core, damping_order=self.damping_order,
+        return dataclasses.replace(require_oscillator(core, self.cause),
+                                   damping_order=self.damping_order,
                                    damping_ratio=self.damping_ratio)
+
+    @classmethod
+    def starts(cls, view):
+        ratio = view.core.damping_ratio
+        orders = [view.core.damping_order + shift
+                  for shift in (-0.8, -0.5, -0.25, -0.05, 0.05, 0.25, 0.5, 0.8)]
+        return [Start(cls(order, ratio), (cls(order, ratio), cls(order, 1.05 * ratio)), "free")
+                for order in orders if 0.05 < order < 1.95]

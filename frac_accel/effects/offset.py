@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import OFFSET, Effect
+from .fit_starts import free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -13,19 +14,17 @@ class Offset(Effect):
     cause = "offset"
     stage = OFFSET
     explanation = "A constant is added to the output."
+    experiment = ("Record at rest, and once more with the sensor turned over: an offset does not "
+                  "turn with it.")
 
     offset: float = parameter("output units")
 
-    @classmethod
-    def simulate(cls, values, by_axis):
-        result = values.copy()
-        for axis, effect in by_axis.items():
-            result[:, axis] += effect.offset
-        return result
+    def simulate(self, values, circumstances):
+        return values + self.offset
+
+    def invert(self, values, variance, circumstances):
+        return values - self.offset, variance
 
     @classmethod
-    def invert(cls, values, by_axis):
-        result = values.copy()
-        for axis, effect in by_axis.items():
-            result[:, axis] -= effect.offset
-        return result
+    def starts(cls, view):
+        return [free(cls(0.01 * view.level), "offset")]

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 from scipy.fft import rfft
 
+from ..convolution import Convolution
 from ..errors import IdentificationError
-from ..simulation import Convolution
 from .excitation import strongest_stretch
 from .frequency_response import averaged_response, bulk_delay
 from .uncertainty import sandwich
@@ -116,7 +116,7 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
     """
     if start is None:
         # where the motion is strongest is enough to find out roughly where the parameters are
-        part = strongest_stretch(reference, _START_LENGTH)
+        part = strongest_stretch(reference, _START_LENGTH, valid)
         rough = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
                          None if valid is None else valid[part], lag_s)
         state = rough.solve(rough.starts())
@@ -148,6 +148,8 @@ class _Problem:
         self.sensor = sensor[self.judged]
         self.instants = (np.arange(self.n) / rate)[self.judged]
         self.size = float(np.std(self.sensor))
+        if self.size**2 == 0:
+            raise IdentificationError("the sensor's output is constant where it counts")
         self.reference, self.whole = reference, sensor
         low, high = structure.bounds(rate, self.n)
         self.low, self.high = np.r_[low, -self.n / 4], np.r_[high, self.n / 4]

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from ..core import FractionalTransferFunction, Oscillator
+from ..core import Oscillator
 from ..core.principal_sheet import fractional_root
+from ..core.sensor_form import from_sensor_parameters
 
 _FREQUENCIES = 24
 _DAMPINGS = (0.02, 0.08, 0.25, 0.7, 1.5)
@@ -196,17 +197,7 @@ class PlainTransferFunctionStructure(FractionalStructure):
         return self._mode(theta, theta[3])
 
     def core(self, fit):
-        omega = 2 * np.pi * fit["natural_frequency_hz"]
-        orders = fit["inertia_order"], fit["damping_order"], 0.0
-        numerator, numerator_orders = self._numerator(fit, omega)
-        return FractionalTransferFunction(
-            denominator_coefficients=(omega**-orders[0],
-                                      2 * fit["damping_ratio"] * omega**-orders[1], 1.0),
-            denominator_orders=orders, numerator_coefficients=numerator,
-            numerator_orders=numerator_orders)
-
-    def _numerator(self, fit, omega):
-        return (fit["sensitivity"],), (0.0,)
+        return from_sensor_parameters({name: fit[name] for name in ("sensitivity", *self.names)})
 
 
 class FractionalTransferFunctionStructure(PlainTransferFunctionStructure):
@@ -235,10 +226,6 @@ class FractionalTransferFunctionStructure(PlainTransferFunctionStructure):
     def grid(self, low_hz, high_hz, peak_hz):
         grid = super().grid(low_hz, high_hz, peak_hz)
         return np.c_[grid, np.full(len(grid), _SLOPE_RATIO), np.full(len(grid), _SLOPE_ORDER)]
-
-    def _numerator(self, fit, omega):
-        slope = fit["sensitivity"] * fit["slope_ratio"] * omega**-fit["slope_order"]
-        return (slope, fit["sensitivity"]), (fit["slope_order"], 0.0)
 
 
 def _natural(theta):

@@ -40,6 +40,21 @@ def sandwich(jacobian, residual, used):
     weighted = spectra[:-1] * np.sqrt(twice * smooth)
     meat = np.real(np.conj(weighted) @ weighted.T) / length
     values, vectors = np.linalg.eigh(scaled @ scaled.T)
-    bread = (vectors / np.maximum(values, 1e-15 * values[-1])) @ vectors.T
+    bread = (vectors / np.maximum(values, 1e-14 * values[-1])) @ vectors.T
+    # as a square, so that rounding makes no variance negative
+    strengths, directions = np.linalg.eigh(meat)
+    root = bread @ (directions * np.sqrt(np.maximum(strengths, 0))) / scale[:, None]
     freedom = len(residual) / max(len(residual) - len(scaled), 1)
-    return freedom * bread @ meat @ bread / np.outer(scale, scale)
+    return freedom * root @ root.T
+
+
+def white_noise(residual):
+    """White part of the residual: what is left above half the Nyquist frequency, spread evenly.
+
+    Below, the residual also holds what the model gets wrong, which is not noise.
+    """
+    clean = np.nan_to_num(residual)
+    power = np.abs(np.fft.rfft(clean * np.hanning(len(clean))))**2
+    window = np.sum(np.hanning(len(clean))**2)
+    # the median of a chi-squared of two degrees is ln 2 of its mean
+    return float(np.sqrt(np.median(power[len(power) // 2:]) / np.log(2) / window))

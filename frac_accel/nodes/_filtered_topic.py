@@ -4,6 +4,7 @@ import time
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import Temperature
 
 from frac_accel.errors import FracAccelError
 from frac_accel.nodes._runtime import INVALID_ENDPOINT, NodeError, RawSubscription
@@ -13,6 +14,16 @@ from frac_accel.nodes._runtime import INVALID_ENDPOINT, NodeError, RawSubscripti
 _GROUPING_SHARE = 0.25
 _LONGEST_GROUPING_S = 0.005
 _POLL_S = 0.001
+
+
+def subscribe_temperature(node, filtered_topics):
+    """Hand what comes on ``imu/temperature`` to the topics; returns the subscription."""
+    def on_message(message):
+        for topic in filtered_topics:
+            topic.set_temperature(message.temperature)
+
+    return node.create_subscription(Temperature, "imu/temperature", on_message,
+                                    qos_profile_sensor_data)
 
 
 def raw_qos(depth):
@@ -68,7 +79,7 @@ class FilteredTopic:
         self._worker = worker
         self._make = make
         self._is_optional = is_optional
-        self._offered = self._candidate = None
+        self._offered = self._candidate = self._celsius = None
         self._on_processed = on_processed
         self._intake = []
         self._task = None
@@ -122,9 +133,20 @@ class FilteredTopic:
         """Filter with this model as soon as there are messages."""
         self._offered = model, wishes
 
+    def set_temperature(self, celsius):
+        """Temperature [°C] of the sensor from now on."""
+        self._celsius = celsius
+        if self.messages is not None:
+            self.stream.set_temperature(celsius)
+
     def start(self):
         """Make the filter for what has been offered now; raises FracAccelError."""
-        self.messages = self._make(*self._offered)
+        self._use(self._make(*self._offered))
+
+    def _use(self, messages):
+        self.messages = messages
+        if self._celsius is not None:
+            self.stream.set_temperature(self._celsius)
 
     def prepare(self, model, wishes):
         """Design another model's filter while this one goes on; raises FracAccelError."""
@@ -150,7 +172,7 @@ class FilteredTopic:
         """Go on with the model that has been prepared."""
         self._offered, self.failure = (model, wishes), ""
         if self.messages is None:
-            self.messages = self._candidate
+            self._use(self._candidate)
         else:
             self._publish(self.messages.replace(model, wishes))
         self._advance()
@@ -227,7 +249,7 @@ class FilteredTopic:
             self._node.get_logger().error(f"{self.name}: {error}")
             return
         if self.messages is None:
-            self.messages = result
+            self._use(result)
         else:
             self._publish(result)
         self._advance()

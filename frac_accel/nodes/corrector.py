@@ -19,7 +19,7 @@ from frac_accel.errors import FracAccelError
 from frac_accel.live_messages import BlockMessages, SampleMessages
 from frac_accel.live_metrics import Findings, LiveMetrics, Window, evaluate
 from frac_accel.model import SensorModel
-from frac_accel.nodes._filtered_topic import FilteredTopic, raw_qos
+from frac_accel.nodes._filtered_topic import FilteredTopic, raw_qos, subscribe_temperature
 from frac_accel.nodes._runtime import (
     FracAccelNode,
     NodeError,
@@ -70,6 +70,8 @@ class Corrector(FracAccelNode):
         self._reference_subscription = RawSubscription(
             self, sample_class, "imu/reference", self._on_reference, raw_qos(depth),
             callback_group=_TakenByTimer())
+        self._temperature_subscription = subscribe_temperature(
+            self, [channel.topic for channel in self._channels])
         self._figures = {}
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.add_on_set_parameters_callback(self._on_parameters)

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from frac_accel import cdr
 from frac_accel.live_messages import NoisySensor, SampleMessages
 from frac_accel.model import SensorModel
-from frac_accel.nodes._filtered_topic import FilteredTopic
+from frac_accel.nodes._filtered_topic import FilteredTopic, subscribe_temperature
 from frac_accel.nodes._runtime import (
     FracAccelNode,
     NodeError,
@@ -43,6 +43,7 @@ class VirtualSensor(FracAccelNode):
                 lambda data: normalised(data, message_class)))
         self._topic.offer(SensorModel.load(model_file), {})
         self._topic.start()
+        self._temperature_subscription = subscribe_temperature(self, [self._topic])
 
     def finish(self):
         """Play what is waiting and say what has been done."""

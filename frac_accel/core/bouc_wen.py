@@ -1,0 +1,36 @@
+r"""Bouc-Wen variable of a hysteretic spring.
+
+:math:`z' = q' - \beta |q'| z - \gamma q' |z|` does not depend on how fast q moves: while q goes one
+way (sign s) and z keeps its sign,
+
+.. math:: dz/dq = 1 - k z, \qquad k = s \beta + \mathrm{sgn}(z) \gamma
+
+has the solution :math:`z + (1 - k z)(1 - e^{-k \Delta q}) / k`.
+"""
+
+import math
+
+
+def follow_one_way(z, change, beta, gamma):
+    """Variable after q has gone by `change` without turning.
+
+    Plain enough to be compiled by numba as it stands.
+    """
+    way = beta if change > 0 else -beta
+    for _ in range(2):  # up to z = 0, and on from there
+        if change == 0.0:
+            break
+        side = z if z != 0.0 else change
+        k = way + (gamma if side > 0 else -gamma)
+        x = -k * change
+        if abs(x) > 0.05:
+            saturation = -math.expm1(x) / k
+        else:  # its series, far faster
+            saturation = change * (
+                1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6)))))
+        end = z + (1 - k * z) * saturation
+        if z * change >= 0 or end * z > 0:
+            return end
+        change -= math.log1p(-k * z) / k if k != 0 else -z
+        z = 0.0
+    return z

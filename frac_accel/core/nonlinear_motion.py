@@ -1,0 +1,465 @@
+r"""Nonlinear motion of an oscillator, as a deviation from its linear motion, compiled.
+
+With :math:`q = q_{lin} + d` the equation of motion leaves, in the time :math:`\tau = \omega_0 t`,
+
+.. math:: d'' + 2 \zeta D^\nu d + d = -N(q_{lin} + d, q'_{lin} + d')
+
+which the modes of the oscillator (`modes`) turn into uncoupled equations y' = pole y - residue N.
+Their step is exact for an N that is a parabola through its values at the step's ends and middle
+(exponential collocation: M. Hochbruck, A. Ostermann, Acta Numerica 19 (2010) 209-286, section 2.2);
+these values are found by fixed-point iteration. Without nonlinear terms d is zero to the last bit.
+
+Coulomb friction is the set-valued law of A. F. Filippov (1988). A step is split where the velocity
+turns and where the mass breaks loose. While it sticks, the force N that holds it is unknown, and
+follows from an acceleration of zero.
+
+This module needs numba; it is imported when a nonlinear model is simulated.
+"""
+
+import numba
+import numpy as np
+
+from .bouc_wen import follow_one_way
+
+_PASSES = 40
+_CONVERGED = 1e-7      # of the force
+_SPLITS = 12            # of one step
+_SHORTEST = 1e-9        # part of a step that is none
+_TURN_PASSES = 4
+_TURNED = 1e-5          # of a step, the permitted error of a turn
+
+_fast = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
+_exact = numba.njit(cache=True, error_model="numpy")
+_inlined = numba.njit(cache=True, error_model="numpy", inline="always")
+
+_follow_one_way = _exact(follow_one_way)
+
+
+def deviation(modes, force, step, motion, start):
+    r"""Deviation d of the output on the grid.
+
+    Parameters
+    ----------
+    modes : Modes
+    force : StaticForce
+    step : float
+        Spacing of the grid in :math:`\tau`.
+    motion : ndarray, shape (k, n)
+        Linear motion and its derivatives by :math:`\tau` on the grid, at least eight points:
+        `derivatives_needed` more than one.
+    start : float
+        Deviation at the start, where the sensor is at rest.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Its end is NaN where the motion grows without bound.
+    """
+    order = np.argsort(modes.poles.imag == 0, kind="stable")  # the complex one first
+    pairs = int(np.sum(modes.poles.imag != 0))
+    poles, residues, displacement, velocity = (
+        np.ascontiguousarray(part[order]) for part in
+        (modes.poles, modes.residues, modes.of_displacement, modes.of_velocity))
+    terms = np.array(force.polynomial[::-1], float)
+    parameters = np.array([force.friction_level, force.strength, force.beta, force.gamma])
+    middles = _middles(motion)
+    if force.friction_level == 0:
+        return _integrate(poles, residues, displacement, pairs, terms, parameters, step, motion,
+                          middles, start)
+    return _integrate_with_friction(poles, residues, displacement, velocity, pairs, modes.mass,
+                                    terms, parameters, step, motion, middles, start)
+
+
+def derivatives_needed(force):
+    """Derivatives of the linear motion that `deviation` needs."""
+    return 2 if force.friction_level != 0 else 1 if force.strength != 0 else 0
+
+
+def _middles(motion):
+    """Values between neighbours, by the polynomial through the six nearest."""
+    padded = np.pad(motion, ((0, 0), (2, 2)), mode="reflect", reflect_type="odd")
+    count = motion.shape[1] - 1
+    f = [padded[:, i:i + count] for i in range(6)]
+    return (150 * (f[2] + f[3]) - 25 * (f[1] + f[4]) + 3 * (f[0] + f[5])) / 256
+
+
+@_exact
+def _moments(z):
+    """Integrals over x from 0 to 1 of exp(z (1 - x)) x**k, for k = 0, 1, 2; and exp(z)."""
+    if abs(z) > 0.5:
+        whole = np.exp(z)
+        m0 = (whole - 1) / z
+        m1 = (m0 - 1) / z
+        return m0, m1, (2 * m1 - 1) / z, whole
+    m0, m1, m2 = 0 * z, 0 * z, 0 * z
+    term = 1 + 0 * z
+    for i in range(16):
+        # z**i k! / (i + k + 1)!
+        m0 += term / (i + 1)
+        m1 += term / ((i + 1) * (i + 2))
+        m2 += 2 * term / ((i + 1) * (i + 2) * (i + 3))
+        term *= z / (i + 1)
+        if abs(term) < 1e-16:
+            break
+    return m0, m1, m2, 1 + z * m0
+
+
+@_exact
+def _prepare_mode(j, length, pole, residue, rows, gains, sums):
+    for i in range(2):
+        part = 0.5 * (i + 1)
+        m0, m1, m2, decay = _moments(pole * part * length)
+        scale = residue * part * length
+        g0, g1, g2 = scale * m0, scale * part * m1, scale * part * part * m2
+        for p in range(3):
+            rows[6 * i + 2 * p, j], rows[6 * i + 2 * p + 1, j] = decay.real, decay.imag
+            sums[i, p, 0] += g0.real
+            sums[i, p, 1] += g1.real
+            sums[i, p, 2] += g2.real
+            if p == 0:
+                gains[0, j], gains[1, j] = g0.real, g0.imag
+                gains[2, j], gains[3, j] = g1.real, g1.imag
+                gains[4, j], gains[5, j] = g2.real, g2.imag
+            decay, g0, g1, g2 = decay * pole, g0 * pole, g1 * pole, g2 * pole
+
+
+@_exact
+def _prepare(length, poles, residues, pairs, rows, gains, sums):
+    """All about a step that depends only on its length.
+
+    rows (12, m): what d, d' and d'' in the middle, then at the end, see of each state, real and
+    imaginary part; sums (2, 3, 3): and of the three coefficients of the parabola; gains (6, m):
+    change of each state by these, real and imaginary part.
+    """
+    sums[:] = 0.0
+    for j in range(pairs):
+        _prepare_mode(j, length, poles[j], residues[j], rows, gains, sums)
+    for j in range(pairs, len(poles)):
+        _prepare_mode(j, length, poles[j].real, residues[j].real, rows, gains, sums)
+
+
+@_fast
+def _seen(rows, row, real, imaginary, pairs):
+    """Real part of the sum of the states, each times its factor in a row (and the next)."""
+    total = 0.0
+    for j in range(len(real)):
+        total += rows[row, j] * real[j]
+    for j in range(pairs):
+        total -= rows[row + 1, j] * imaginary[j]
+    return total
+
+
+@_fast
+def _advance(rows, gains, real, imaginary, pairs, n0, n1, n2):
+    """Move the states to the end of a step with the parabola n0 + n1 x + n2 x**2."""
+    for j in range(pairs):
+        before = real[j]
+        real[j] = (rows[6, j] * before - rows[7, j] * imaginary[j]
+                   - (gains[0, j] * n0 + gains[2, j] * n1 + gains[4, j] * n2))
+        imaginary[j] = (rows[6, j] * imaginary[j] + rows[7, j] * before
+                        - (gains[1, j] * n0 + gains[3, j] * n1 + gains[5, j] * n2))
+    for j in range(pairs, len(real)):
+        real[j] = rows[6, j] * real[j] - (gains[0, j] * n0 + gains[2, j] * n1 + gains[4, j] * n2)
+
+
+@_exact
+def _add(real, imaginary, share, states):
+    for j in range(len(real)):
+        real[j] += share * states[j].real
+        imaginary[j] += share * states[j].imag
+
+
+@_inlined
+def _parabola(n0, nm, ne):
+    """Coefficients of the parabola through values at 0, 1/2 and 1."""
+    return n0, -3 * n0 + 4 * nm - ne, 2 * n0 - 4 * nm + 2 * ne
+
+
+@_exact
+def _at(motion, order, index, part):
+    """Motion `part` of an interval after grid point `index`: polynomial through six points."""
+    first = min(max(index - 2, 0), motion.shape[1] - 6)
+    place = index - first + part
+    total = 0.0
+    for i in range(6):
+        weight = motion[order, first + i]
+        for j in range(6):
+            if j != i:
+                weight *= (place - j) / (i - j)
+        total += weight
+    return total
+
+
+@_inlined
+def _power_terms(terms, q):
+    total = 0.0
+    for coefficient in terms:
+        total = (total + coefficient) * q
+    return total * q
+
+
+@_exact
+def _follow(z, q0, v0, q1, v1, duration, beta, gamma):
+    """Bouc-Wen variable after q has gone from q0 to q1 with the velocities v0 and v1 at the ends.
+
+    If the velocity turns on the way, it is taken as linear in time.
+    """
+    if v0 * v1 < 0:
+        turn = q0 + 0.5 * duration * v0 * v0 / (v0 - v1)
+        z = _follow_one_way(z, turn - q0, beta, gamma)
+        return _follow_one_way(z, q1 - turn, beta, gamma)
+    return _follow_one_way(z, q1 - q0, beta, gamma)
+
+
+@_inlined
+def _motion(free, sums, i, order, p0, p1, p2):
+    """Derivative of the output in the middle (i = 0) or at the end (1) of a step."""
+    return free[i, order] - (p0 * sums[i, order, 0] + p1 * sums[i, order, 1]
+                             + p2 * sums[i, order, 2])
+
+
+@_exact
+def _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameters):
+    """Force in the middle and at the end of a step without a turn, and the hysteresis there.
+
+    free (2, 3): q, q', q'' in the middle and at the end without a force in this step; n0, q0, v0,
+    z0: force and motion at the start; nm, ne: a guess.
+    """
+    strength, beta, gamma = parameters[1], parameters[2], parameters[3]
+    zm, ze = z0, z0
+    for _ in range(_PASSES):
+        p0, p1, p2 = _parabola(n0, nm, ne)
+        qm = _motion(free, sums, 0, 0, p0, p1, p2)
+        qe = _motion(free, sums, 1, 0, p0, p1, p2)
+        if strength != 0:
+            vm = _motion(free, sums, 0, 1, p0, p1, p2)
+            ve = _motion(free, sums, 1, 1, p0, p1, p2)
+            zm = _follow(z0, q0, v0, qm, vm, length / 2, beta, gamma)
+            ze = _follow(zm, qm, vm, qe, ve, length / 2, beta, gamma)
+        newm = _power_terms(terms, qm) + strength * zm + friction
+        newe = _power_terms(terms, qe) + strength * ze + friction
+        change = abs(newm - nm) + abs(newe - ne)
+        nm, ne = newm, newe
+        if change <= _CONVERGED * (abs(n0) + abs(nm) + abs(ne)):
+            break
+    return nm, ne, ze
+
+
+@_exact
+def _stick(free, sums, n0, mass):
+    """Force in the middle and at the end of a step that keeps the acceleration at zero."""
+    matrix = np.empty((2, 2))
+    right = np.empty(2)
+    for i in range(2):
+        s0, s1, s2 = sums[i, 2, 0], sums[i, 2, 1], sums[i, 2, 2]
+        matrix[i, 0], matrix[i, 1] = 4 * s1 - 4 * s2, 2 * s2 - s1
+        matrix[i, i] += 1 / mass
+        right[i] = free[i, 2] - n0 * (s0 - 3 * s1 + 2 * s2)
+    determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
+    return ((right[0] * matrix[1, 1] - right[1] * matrix[0, 1]) / determinant,
+            (right[1] * matrix[0, 0] - right[0] * matrix[1, 0]) / determinant)
+
+
+@_exact
+def _crossing(p0, p1, p2, level):
+    """First part of the step at which a parabola leaves the range from -level to level."""
+    low, high = 0.0, 1.0
+    if abs(p0 + p1 / 2 + p2 / 4) > level:
+        high = 0.5
+    for _ in range(45):
+        x = (low + high) / 2
+        if abs(p0 + x * (p1 + x * p2)) > level:
+            high = x
+        else:
+            low = x
+    return high
+
+
+@_exact
+def _crossing_zero(v0, vm, ve, slip):
+    """First part of the step at which the parabola through v0, vm, ve turns against `slip`."""
+    p0, p1, p2 = _parabola(v0, vm, ve)
+    low, high = 0.0, 1.0
+    if vm * slip < 0:
+        high = 0.5
+    for _ in range(30):
+        x = (low + high) / 2
+        if (p0 + x * (p1 + x * p2)) * slip < 0:
+            high = x
+        else:
+            low = x
+    return high
+
+
+@_inlined
+def _look(rows, real, imaginary, pairs, motion, middles, index, orders, free):
+    """Fill `free` for a whole step."""
+    for order in range(orders):
+        free[0, order] = middles[order, index] + _seen(rows, 2 * order, real, imaginary, pairs)
+        free[1, order] = (motion[order, index + 1]
+                          + _seen(rows, 6 + 2 * order, real, imaginary, pairs))
+
+
+@_exact
+def _look_at_part(rows, real, imaginary, pairs, motion, index, position, left, orders, free):
+    """Fill `free` for a step of `left` intervals from `position` after a grid point."""
+    for order in range(orders):
+        free[0, order] = (_at(motion, order, index, position + left / 2)
+                          + _seen(rows, 2 * order, real, imaginary, pairs))
+        free[1, order] = (_at(motion, order, index, position + left)
+                          + _seen(rows, 6 + 2 * order, real, imaginary, pairs))
+
+
+@_exact
+def _start(poles, now, real, imaginary, start, of_displacement):
+    """Fill `now` (6, m): what d, d' and d'' see of the states as they are; displace these."""
+    for j in range(len(poles)):
+        power = 1 + 0j
+        for p in range(3):
+            now[2 * p, j], now[2 * p + 1, j] = power.real, power.imag
+            power *= poles[j]
+    _add(real, imaginary, start, of_displacement)
+
+
+@_exact
+def _integrate(poles, residues, of_displacement, pairs, terms, parameters, step, motion, middles,
+               start):
+    m = len(poles)
+    rows, gains, sums, now = (np.empty((12, m)), np.empty((6, m)), np.empty((2, 3, 3)),
+                              np.empty((6, m)))
+    free = np.zeros((2, 3))
+    real, imaginary = np.zeros(m), np.zeros(m)
+    _prepare(step, poles, residues, pairs, rows, gains, sums)
+    _start(poles, now, real, imaginary, start, of_displacement)
+    orders = motion.shape[0]
+    result = np.full(motion.shape[1], np.nan)
+    result[0] = start
+    q0, v0, z = motion[0, 0] + start, motion[1, 0] if orders > 1 else 0.0, 0.0
+    n0, p1, p2 = _power_terms(terms, q0), 0.0, 0.0
+    for index in range(motion.shape[1] - 1):
+        _look(rows, real, imaginary, pairs, motion, middles, index, orders, free)
+        nm, ne, z = _slip(free, sums, step, n0, q0, v0, z, n0 + 1.5 * p1 + 2.25 * p2,
+                          n0 + 2 * p1 + 4 * p2, 0.0, terms, parameters)
+        p0, p1, p2 = _parabola(n0, nm, ne)
+        q0 = _motion(free, sums, 1, 0, p0, p1, p2)
+        if orders > 1:
+            v0 = _motion(free, sums, 1, 1, p0, p1, p2)
+        _advance(rows, gains, real, imaginary, pairs, p0, p1, p2)
+        n0 = ne
+        if not np.isfinite(q0):
+            break
+        result[index + 1] = q0 - motion[0, index + 1]
+    return result
+
+
+@_exact
+def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pairs, mass, terms,
+                             parameters, step, motion, middles, start):
+    m = len(poles)
+    rows, gains, sums, now = (np.empty((12, m)), np.empty((6, m)), np.empty((2, 3, 3)),
+                              np.empty((6, m)))
+    part_rows, part_gains, part_sums = rows.copy(), gains.copy(), sums.copy()
+    free = np.zeros((2, 3))
+    real, imaginary = np.zeros(m), np.zeros(m)
+    _prepare(step, poles, residues, pairs, rows, gains, sums)
+    _start(poles, now, real, imaginary, start, of_displacement)
+    level, strength = parameters[0], parameters[1]
+    result = np.full(motion.shape[1], np.nan)
+    result[0] = start
+    # a record may start in mid-motion
+    q0, v0, z = motion[0, 0] + start, motion[1, 0], 0.0
+    slip, sticks = np.sign(v0), v0 == 0
+    n0 = _power_terms(terms, q0) + level * slip
+    if sticks:
+        n0 = mass * (motion[2, 0] + _seen(now, 4, real, imaginary, pairs))
+    p0, p1, p2 = n0, 0.0, 0.0
+    for index in range(motion.shape[1] - 1):
+        position = 0.0
+        for split in range(_SPLITS):
+            left = 1.0 - position
+            r, g, s = rows, gains, sums
+            orders = 3 if sticks else 2
+            if position == 0:
+                _look(r, real, imaginary, pairs, motion, middles, index, orders, free)
+            else:
+                r, g, s = part_rows, part_gains, part_sums
+                _prepare(step * left, poles, residues, pairs, r, g, s)
+                _look_at_part(r, real, imaginary, pairs, motion, index, position, left, orders,
+                              free)
+            smooth = _power_terms(terms, q0) + strength * z
+            changes = False
+            if sticks:
+                nm, ne = _stick(free, s, n0, mass)
+                p0, p1, p2 = _parabola(n0, nm, ne)
+                changes = abs(nm - smooth) > level or abs(ne - smooth) > level
+                if changes:
+                    share = _crossing(p0 - smooth, p1, p2, level)
+                    left *= share
+                    p1, p2 = p1 * share, p2 * share * share
+                    r, g, s = part_rows, part_gains, part_sums
+                    _prepare(step * left, poles, residues, pairs, r, g, s)
+                end = (motion[0, index + 1], motion[1, index + 1])
+                if changes or position > 0:
+                    end = (_at(motion, 0, index, position + left),
+                           _at(motion, 1, index, position + left))
+                _advance(r, g, real, imaginary, pairs, p0, p1, p2)
+                _add(real, imaginary, q0 - end[0] - _seen(now, 0, real, imaginary, pairs),
+                     of_displacement)
+                _add(real, imaginary, -end[1] - _seen(now, 2, real, imaginary, pairs), of_velocity)
+                n0 = p0 + p1 + p2
+                if changes:
+                    sticks, slip = False, np.sign(n0 - smooth)
+                    n0 = smooth + level * slip
+                    p0, p1, p2 = n0, 0.0, 0.0
+            else:
+                friction = level * slip
+                z0 = z
+                nm, ne, z = _slip(free, s, step * left, n0, q0, v0, z0,
+                                  p0 + 1.5 * p1 + 2.25 * p2, p0 + 2 * p1 + 4 * p2, friction, terms,
+                                  parameters)
+                p0, p1, p2 = _parabola(n0, nm, ne)
+                vm = _motion(free, s, 0, 1, p0, p1, p2)
+                ve = _motion(free, s, 1, 1, p0, p1, p2)
+                changes = (vm * slip < 0 or ve * slip < 0) and split < _SPLITS - 1
+                if changes:
+                    # the part of the step after which the velocity is zero
+                    share = _crossing_zero(v0, vm, ve, slip)
+                    r, g, s = part_rows, part_gains, part_sums
+                    rest = left
+                    for _ in range(_TURN_PASSES):
+                        left = share * rest
+                        _prepare(step * left, poles, residues, pairs, r, g, s)
+                        _look_at_part(r, real, imaginary, pairs, motion, index, position, left, 2,
+                                      free)
+                        nm, ne, z = _slip(free, s, step * left, n0, q0, v0, z0, n0, n0,
+                                          friction, terms, parameters)
+                        p0, p1, p2 = _parabola(n0, nm, ne)
+                        vm = _motion(free, s, 0, 1, p0, p1, p2)
+                        ve = _motion(free, s, 1, 1, p0, p1, p2)
+                        slope = (v0 - 4 * vm + 3 * ve) / share
+                        if slope * slip >= 0 or abs(ve) <= _TURNED * abs(slope):
+                            break
+                        share = min(max(share - ve / slope, 0.1 * share), 1.0)
+                q0 = _motion(free, s, 1, 0, p0, p1, p2)
+                v0 = ve
+                _advance(r, g, real, imaginary, pairs, p0, p1, p2)
+                n0 = ne
+                if changes:
+                    smooth = _power_terms(terms, q0) + strength * z
+                    n0 = mass * (_at(motion, 2, index, position + left)
+                                 + _seen(now, 4, real, imaginary, pairs))
+                    sticks = abs(n0 - smooth) <= level
+                    if sticks:
+                        _add(real, imaginary, -v0, of_velocity)
+                    else:
+                        slip = np.sign(n0 - smooth)
+                        n0 = smooth + level * slip
+                    v0 = 0.0
+                    p0, p1, p2 = n0, 0.0, 0.0
+            position = position + left if changes else 1.0
+            if position > 1 - _SHORTEST:
+                break
+        if not np.isfinite(q0):
+            break
+        result[index + 1] = _seen(now, 0, real, imaginary, pairs)
+    return result

@@ -1,0 +1,261 @@
+r"""What a nonlinear spring adds to the inverse of a sensor.
+
+The equation of motion is explicit in the output q, so that the inverse is a filter and a static
+map:
+
+.. math:: a = L^{-1} q + N(q, q') / S
+
+with the linear core L. The filter runs on the raw samples; this path makes q from them, between
+the samples, too (else the harmonics that N makes would fold back into the band), applies N and lets
+its result through the same band with the same delay.
+"""
+
+import dataclasses
+
+import numpy as np
+from scipy.special import erf
+
+from ..core.bouc_wen import follow_one_way
+from ..effects.base import CORE
+from ..errors import DesignError
+from .filter import FilterState, ParallelFilter
+from .fitting import FilterProblem
+
+# Points at which q is made in each sampling interval: the third harmonic of 0.6 of the Nyquist
+# frequency, and its mirror image, then lie outside the band.
+POINTS = 4
+# q is made up to this share of the Nyquist frequency, or where a low-pass leaves this much gain.
+_TOP = 0.7
+_LEAST_GAIN = 0.2
+# Worst relative errors; N itself is a small part of the signal.
+_TOLERANCE = 2e-3
+_BAND_TOLERANCE = 5e-3
+_DELAYS = (6, 8, 12, 16, 24, 32, 48, 64)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StaticTerms:
+    """Path of an axis's `StaticForce` into the corrected signal.
+
+    Attributes
+    ----------
+    force : StaticForce
+    phases : tuple of ParallelFilter
+        From samples to q, at each of the `POINTS` instants of an interval.
+    band : ParallelFilter
+        From N at those instants to what is added to the corrected signal.
+    output_noise, velocity_noise : float
+        Standard deviation of q, and of half its change over two instants, per standard deviation
+        of white noise of the samples.
+    own_noise, common_noise : float
+        Square of the noise gain of this path for a force of slope one, and its product with the
+        linear filter's.
+    is_coupled : bool
+        Whether the sensor knows nothing of a steady q.
+    """
+
+    force: object
+    phases: tuple
+    band: ParallelFilter
+    output_noise: float
+    velocity_noise: float
+    own_noise: float
+    common_noise: float
+    is_coupled: bool
+
+    @property
+    def warm_up_samples(self):
+        """Samples until both stages are full."""
+        first = max(phase.lead + len(phase.taps) for phase in self.phases)
+        return first + -(-(self.band.lead + len(self.band.taps) + 2) // POINTS)
+
+
+class StaticTermsDesign:
+    """Both stages for one axis; the delay is shared between them.
+
+    Parameters
+    ----------
+    axis : AxisModel
+    rate : float
+        Sampling rate [Hz].
+    band : tuple of float
+        Of the correction [Hz].
+    late : float
+        Delay [samples] that this axis has beyond the common one.
+    """
+
+    def __init__(self, axis, rate, band, late):
+        self._axis, self._rate = axis, rate
+        behind = [link for link in axis.dynamics[1:] if link.stage > CORE]
+        before = [link for link in axis.dynamics[1:] if link.stage < CORE]
+
+        def to_output(s):
+            return 1 / np.prod([np.ones_like(s), *(link.transfer_function(s) for link in behind)],
+                               axis=0)
+
+        def to_base(s):
+            return 1 / (axis.effective_core.sensitivity * np.prod(
+                [np.ones_like(s), *(link.transfer_function(s) for link in before)], axis=0))
+
+        grid = np.linspace(0.02, _TOP, 50) * rate / 2
+        gain = 1 / np.abs(to_output(2j * np.pi * grid))
+        top = grid[np.flatnonzero(gain >= _LEAST_GAIN * gain.max())[-1]]
+        zeros = np.concatenate([np.empty(0), *(link.zeros() for link in behind)])
+        self.is_coupled = bool((zeros == 0).any())
+        low = band[0] if self.is_coupled else 0.0
+        self._phases = [FilterProblem(to_output, zeros, rate, (low, max(top, 1.1 * band[1])),
+                                      late - point / POINTS) for point in range(POINTS)]
+        self._band = FilterProblem(to_base, np.empty(0), POINTS * rate, (0.0, band[1]), 0)
+        self.first_delay, self._filters = self._shortest(
+            lambda delay: [phase.solve(delay, _TOLERANCE) for phase in self._phases], _TOLERANCE)
+        second, _ = self._shortest(
+            lambda delay: [self._band.solve(POINTS * delay - 1, _BAND_TOLERANCE)], _BAND_TOLERANCE)
+        self.least_delay = self.first_delay + second
+
+    def _shortest(self, solve, tolerance):
+        for delay in _DELAYS:
+            filters = solve(delay)
+            error = max(max(f.amplitude_error, np.radians(f.phase_error_deg)) for f in filters)
+            if error <= tolerance:
+                return delay, filters
+        raise DesignError(f"the nonlinear terms cannot be corrected up to "
+                          f"{self._phases[0].band[1]:.4g} Hz at {self._rate:.6g} Hz: an error of "
+                          f"{error:.2g} remains; ask for a smaller bandwidth")
+
+    def solve(self, delay, linear):
+        """`StaticTerms` for a total delay [samples], beside the linear DesignedFilter."""
+        # the force at an instant needs the one after it
+        band = self._band.solve(POINTS * (delay - self.first_delay) - 1, _BAND_TOLERANCE).filter
+        phases = tuple(f.filter for f in self._filters)
+        length = max(len(phase.taps) for phase in phases) + len(band.taps) // POINTS + 8
+        impulse = np.zeros((1, length + linear.filter.lead + len(linear.filter.taps)))
+        impulse[0, 0] = 1.0
+        fine = _between(phases, impulse, np.zeros(1))[0]
+        change = np.r_[0.0, (fine[2:] - fine[:-2]) / 2, 0.0]
+        own = _run(band, np.roll(fine, 1)[None])[0][::POINTS]
+        main = _run(linear.filter, impulse)[0]
+        return StaticTerms(
+            force=self._axis.static_force, phases=phases, band=band, is_coupled=self.is_coupled,
+            output_noise=_loudest(fine), velocity_noise=_loudest(change),
+            own_noise=float(np.sum(own**2)), common_noise=float(np.sum(own * main)))
+
+
+def _loudest(fine):
+    """Noise gain of the loudest of the interleaved phases."""
+    return float(np.sqrt(np.sum(fine.reshape(-1, POINTS)**2, axis=0).max()))
+
+
+def _run(parallel_filter, values):
+    return FilterState(parallel_filter, np.zeros(len(values))).process(values)
+
+
+def _between(phases, values, level):
+    states = [FilterState(phase, level) for phase in phases]
+    return _interleaved([state.process(values) for state in states])
+
+
+def _interleaved(parts):
+    return np.stack(parts, axis=2).reshape(len(parts[0]), -1)
+
+
+class StaticTermsState:
+    """`StaticTerms` of some axes running over their samples, in blocks of any length.
+
+    Parameters
+    ----------
+    terms : StaticTerms
+    level : ndarray, shape (k,)
+        The samples of each axis before the first: a constant.
+    """
+
+    def __init__(self, terms, level):
+        self._terms = terms
+        self._states = [FilterState(phase, level) for phase in terms.phases]
+        gain = terms.phases[0].static_gain
+        steady = np.repeat((gain * level)[:, None], 2, axis=1)
+        # q and its noise at the last two instants
+        self._last, self._last_noise = steady, np.zeros_like(steady)
+        force = _power_terms(terms.force.polynomial, steady[:, 0])
+        self._band = FilterState(terms.band, force)
+        self._z, self._before = np.zeros(len(level)), steady[:, 0].copy()
+        weight = np.abs(terms.band.taps)
+        rest = np.zeros(len(level))
+        spread = dataclasses.replace(terms.band, taps=weight)
+        self._slope = FilterState(
+            dataclasses.replace(terms.band, taps=weight / weight.sum()), rest)
+        self._doubt = FilterState(spread, rest)
+
+    def process(self, values, variance):
+        """What to add to the corrected samples, and the variance that it brings; shape (k, n).
+
+        Parameters
+        ----------
+        values, variance : ndarray, shape (k, n)
+            Samples, and their noise.
+        """
+        terms = self._terms
+        fine = _interleaved([state.process(values) for state in self._states])
+        noise = np.repeat(np.sqrt(variance), POINTS, axis=1)
+        q = np.concatenate([self._last, fine], axis=1)
+        spread = np.concatenate([self._last_noise, noise], axis=1)
+        self._last, self._last_noise = q[:, -2:], spread[:, -2:]
+        here = q[:, 1:-1]
+        force, doubt = self._force(here, (q[:, 2:] - q[:, :-2]) / 2,
+                                   q[:, 2:] - 2 * here + q[:, :-2],
+                                   terms.velocity_noise * spread[:, 1:-1])
+        # of the linear noise, this path repeats or cancels a part
+        slope = self._slope.process(_slope(terms.force.polynomial, here))[:, ::POINTS]
+        added = variance * (2 * slope * terms.common_noise + slope**2 * terms.own_noise)
+        added += self._doubt.process(doubt)[:, ::POINTS]**2
+        return self._band.process(force)[:, ::POINTS], added
+
+    def _force(self, q, change, bend, change_noise):
+        """N at the instants, and the standard deviation of what is not known of it.
+
+        change, bend : first and second difference of q; change_noise : the first one's noise.
+        """
+        force = self._terms.force
+        total = _power_terms(force.polynomial, q)
+        doubt = np.zeros_like(q)
+        if force.friction_level:
+            # of a velocity that turns between two instants, the mean sign counts
+            sign = _mean_sign(change, change_noise**2 + bend**2 / 12)
+            total += force.friction_level * sign
+            # While the mass sticks, which shows as a velocity below the noise, all that is known
+            # of the friction is that it is less than its level; the same where it turns.
+            doubt += force.friction_level * np.sqrt(np.maximum(1 - sign**2, 0))
+        if force.strength:
+            total += force.strength * self._hysteresis(q)
+        return total, doubt
+
+    def _hysteresis(self, q):
+        force = self._terms.force
+        result = np.empty_like(q)
+        for row in range(len(q)):
+            z, before = self._z[row], self._before[row]
+            for i, value in enumerate(q[row].tolist()):
+                z = follow_one_way(z, value - before, force.beta, force.gamma)
+                before = value
+                result[row, i] = z
+            self._z[row], self._before[row] = z, before
+        return result
+
+
+def _mean_sign(values, variance):
+    """Mean of the sign of something that is seen as `values` through noise."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(variance > 0, erf(values / np.sqrt(2 * variance)), np.sign(values))
+
+
+def _power_terms(polynomial, q):
+    total = np.zeros_like(q)
+    for coefficient in reversed(polynomial):
+        total = (total + coefficient) * q
+    return total * q
+
+
+def _slope(polynomial, q):
+    total = np.zeros_like(q)
+    for power, coefficient in reversed(list(enumerate(polynomial, 2))):
+        total = (total + power * coefficient) * q
+    return total

@@ -1,0 +1,33 @@
+"""Natural frequency and damping other than the model's."""
+
+import dataclasses
+
+from ..parameters import parameter
+from .base import CORE, Effect, require_oscillator
+from .fit_starts import Start
+
+
+@dataclasses.dataclass(frozen=True)
+class CoreParameterShift(Effect):
+    """The oscillator has another natural frequency and damping ratio, as ageing leaves it."""
+
+    cause = "core_parameter_shift"
+    stage = CORE
+    explanation = "The sensor's natural frequency and damping are no longer those of the model."
+    experiment = ("Sweep across the resonance: place and width of the peak give frequency and "
+                  "damping by themselves.")
+
+    natural_frequency_hz: float = parameter("Hz", above=0, maximum=1e8)
+    damping_ratio: float = parameter("1", above=0, maximum=100)
+
+    def change_core(self, core):
+        """Raise ModelError where the core is not an oscillator."""
+        return dataclasses.replace(require_oscillator(core, self.cause),
+                                   natural_frequency_hz=self.natural_frequency_hz,
+                                   damping_ratio=self.damping_ratio)
+
+    @classmethod
+    def starts(cls, view):
+        frequency, ratio = view.core.natural_frequency_hz, view.core.damping_ratio
+        return [Start(cls(1.003 * frequency, 1.01 * ratio),
+                      (cls(1.003 * frequency, ratio), cls(frequency, 1.01 * ratio)), "free")]

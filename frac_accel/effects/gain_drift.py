@@ -1,0 +1,39 @@
+"""Sensitivity that changes steadily with time."""
+
+import dataclasses
+
+import numpy as np
+
+from ..parameters import parameter
+from .base import GAIN, Effect
+from .fit_starts import free
+
+_LEAST = 1e-3
+
+
+@dataclasses.dataclass(frozen=True)
+class GainDrift(Effect):
+    """Gain 1 + rate t, t from the record's start."""
+
+    cause = "gain_drift"
+    stage = GAIN
+    explanation = "The sensitivity drifts with time."
+    experiment = "Keep level and temperature constant for longer: a drift goes on with time."
+
+    rate_per_s: float = parameter("1/s")
+
+    def simulate(self, values, circumstances):
+        return values * self._gain(circumstances)
+
+    def invert(self, values, variance, circumstances):
+        gain = self._gain(circumstances)
+        # a line that has reached zero says nothing any more
+        gain = np.where(np.abs(gain) < _LEAST, np.copysign(_LEAST, gain), gain)
+        return values / gain, variance / gain**2
+
+    def _gain(self, circumstances):
+        return 1 + self.rate_per_s * circumstances.time_s
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(1e-3), "rate_per_s")]

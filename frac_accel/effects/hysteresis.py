@@ -1,0 +1,45 @@
+"""Spring whose force depends on where it has been."""
+
+import dataclasses
+
+from ..errors import ModelError
+from ..parameters import parameter
+from .base import CORE, Effect, require_oscillator
+from .fit_starts import positive
+
+
+@dataclasses.dataclass(frozen=True)
+class Hysteresis(Effect):
+    r"""Restoring force :math:`\omega_0^2 \lambda z`.
+
+    .. math:: z' = q' - \beta |q'| z - \gamma q' |z|
+
+    R. Bouc (1967); Y.-K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249-263.
+    """
+
+    cause = "hysteresis"
+    stage = CORE
+    explanation = "The spring's force depends on its path, so that it takes another way back."
+    experiment = ("Drive one slow sine at several levels: output over acceleration is a loop, "
+                  "which stays open however slow.")
+
+    strength: float = parameter("1")
+    beta: float = parameter("1/(output units)", minimum=0)
+    gamma: float = parameter("1/(output units)")
+
+    def __post_init__(self):
+        # F. Ikhouane, J. Rodellar, Systems with Hysteresis (2007), table 2.1: else z has no bound
+        if self.beta + self.gamma < 0:
+            raise ModelError(f"effects: hysteresis with gamma {self.gamma:g} given, expected at "
+                             f"least -beta ({-self.beta:g})")
+
+    def change_core(self, core):
+        return require_oscillator(core, self.cause)
+
+    def add_force(self, force):
+        return dataclasses.replace(force, strength=self.strength, beta=self.beta, gamma=self.gamma)
+
+    @classmethod
+    def starts(cls, view):
+        return [positive(cls(0.02, beta / view.level, share * beta / view.level), "strength")
+                for beta in (0.3, 1.0, 3.0) for share in (-0.4, 0.4)]

@@ -1,0 +1,86 @@
+"""Tone that is added to the output."""
+
+import dataclasses
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ..parameters import parameter
+from .base import INTERFERENCE, Effect
+from .fit_starts import finite, strongest_line
+
+# A tone that wanders by less than about a third of this share of its frequency is followed.
+_RELATIVE_WIDTH = 3e-4
+
+
+@dataclasses.dataclass(frozen=True)
+class ToneInterference(Effect):
+    """Adds a sine that has nothing to do with the motion, such as mains hum."""
+
+    cause = "tone_interference"
+    stage = INTERFERENCE
+    explanation = "A tone from elsewhere, such as mains hum, is added to the output."
+    experiment = "Record at rest: a tone from elsewhere is still there."
+
+    frequency_hz: float = parameter("Hz", above=0)
+    amplitude: float = parameter("output units", minimum=0)
+    # of the sine at the record's start
+    phase_rad: float = parameter("rad", default=0.0)
+
+    def simulate(self, values, circumstances):
+        return values + self._tone(circumstances)
+
+    def invert(self, values, variance, circumstances):
+        return values - self._tone(circumstances), variance
+
+    def live(self, sampling_rate_hz):
+        """In a stream the phase is not known: it is found."""
+        return _Tracker(self, sampling_rate_hz)
+
+    def _tone(self, circumstances):
+        phase = 2 * np.pi * self.frequency_hz * circumstances.time_s + self.phase_rad
+        return self.amplitude * np.sin(phase)
+
+
+class _Tracker:
+    r"""Finds the phase of the tone in a stream and takes the tone out.
+
+    The samples are turned back by the tone's own angle and averaged, first over all that there
+    are, then over a fading memory; the mean is that of the tone and, with a variance that falls
+    with the number of samples, of all else. As the amplitude is known, the mean is shrunk by what
+    it is worth: the tone's power over that and the variance (N. Wiener, 1949). What is left of
+    the tone, or lost of the motion, counts as variance.
+    """
+
+    def __init__(self, effect, sampling_rate_hz):
+        self._turns = effect.frequency_hz / sampling_rate_hz
+        self._keep = np.exp(-np.pi * _RELATIVE_WIDTH * self._turns)
+        self._power = effect.amplitude**2
+        self._sum, self._squares = np.zeros(1, complex), np.zeros(1)
+        self._first, self._count = None, 0
+
+    def invert(self, values, variance, circumstances):
+        if not len(values):
+            return values, variance
+        if self._first is None:
+            self._first = values[0]  # most of a steady part, such as gravity
+        number = self._count + np.arange(1, len(values) + 1)
+        self._count += len(values)
+        angle = 2 * np.pi * np.mod(self._turns * number, 1.0)
+        tone = np.cos(angle) + 1j * np.sin(angle)
+        moving = values - self._first
+        feedback = [1.0, -self._keep]
+        sums, self._sum = lfilter([1.0], feedback, moving * tone.conj(), zi=self._sum)
+        squares, self._squares = lfilter([1.0], feedback, moving**2, zi=self._squares)
+        weight = (1 - self._keep**number) / (1 - self._keep)
+        squared_weight = (1 - self._keep**(2 * number)) / (1 - self._keep**2)
+        doubt = 4 * squares * squared_weight / weight**3
+        worth = self._power / np.maximum(self._power + doubt, 1e-300)
+        found = 2 * sums / weight * worth
+        return (values - (found.real * tone.real - found.imag * tone.imag),
+                variance + worth * doubt / 2)
+
+    @classmethod
+    def starts(cls, view):
+        line = strongest_line(view)
+        return [finite(cls(*line))] if line else []
