@@ -17,7 +17,7 @@ _WAY = 64
 _ITERATIONS = 150
 # A step this small against the standard uncertainties changes nothing that the data can tell.
 _SMALL_STEP = 1e-2
-_IMPROVEMENTS = 8
+_IMPROVEMENTS = 5
 # Steps after which a search that goes on is in a curved valley, and how far it looks ahead there.
 _STRAIGHT, _AHEAD = 8, 0.1
 # Damping of the search: enough to keep a singular system solvable, and what is as good as none.
@@ -188,10 +188,12 @@ class _Problem:
         best_delay = np.argmax(explained, axis=1)
         explained = np.max(explained, axis=1)
         chosen, seen = [], {}
+        # neighbours in frequency end in the same place; other dampings may not
+        kinds = np.c_[np.round(grid[:, 0], 1), np.round(grid[:, 1:], 3)].tolist()
+        groups = grid[:, held].tolist()
         for point in np.argsort(explained)[::-1]:
-            # neighbours in frequency end in the same place; other dampings may not
-            kind = *np.round(grid[point][1:], 3), round(grid[point][0], 1)
-            group = seen.setdefault(tuple(grid[point][held]), set())
+            kind = tuple(kinds[point])
+            group = seen.setdefault(tuple(groups[point]), set())
             if kind not in group and len(group) < self.structure.starting_points:
                 group.add(kind)
                 chosen.append(np.r_[grid[point], delays[best_delay[point]]])
@@ -300,12 +302,10 @@ class _Problem:
         faint = np.diag(np.r_[0.0, 0.0, np.full(count - 2, _FAINT**2)])
         linear = _solve(known @ known.T + faint, known @ self.sensor)
         residual = self.sensor - linear @ known
-        if swing is not None:
+        noise = residual @ residual / len(residual)
+        if swing is not None and np.sum((linear[2:4] @ known[2:4])**2) > _FEIGNED * noise:
             # with the pole, what it left behind changes as well; what noise feigns of it does not
-            motion = linear[2:4] @ known[2:4]
-            feigned = _FEIGNED * (residual @ residual) / len(residual)
-            shown = 1 / (1 + (feigned / max(motion @ motion, 1e-300))**2)
-            change = shown * (linear[2] - 1j * linear[3]) / linear[0] * self.instants * swing
+            change = (linear[2] - 1j * linear[3]) / linear[0] * self.instants * swing
             rows[count:-1] += np.outer(pole_slopes.real, change.real)
             rows[count:-1] -= np.outer(pole_slopes.imag, change.imag)
         gram, right = rows @ rows.T, rows @ self.sensor
