@@ -1,14 +1,19 @@
 """Every cause is simulated as the independent simulator does it, alone and in company."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 import rig
 from random_models import model_of
 
+import frac_accel.core
 from frac_accel import simulate
 from frac_accel.effects import known_effects
 from frac_accel.errors import FracAccelError, ModelError
 from frac_accel.model import SensorModel
+from frac_accel.parameters import parameter_fields
 from frac_accel.simulation import AxisSimulator
 
 # What a diagnosis at 80 dB needs; the project's bar is 1e-3.
@@ -230,5 +235,24 @@ def test_parameters_that_cannot_be_are_refused(effect, words):
         model_with(effect)
 
 
-def test_every_cause_of_the_rig_is_known():
+def test_every_cause_of_the_rig_is_known_and_documented():
     assert set(rig.CAUSES) <= set(known_effects())
+    page = (Path(__file__).parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")
+    for cause in rig.CAUSES:
+        row, = (line for line in page.splitlines() if line.startswith(f"| `{cause}` |"))
+        effect = known_effects()[cause]
+        assert effect.explanation in row
+        for field in parameter_fields(effect):
+            unit = field.metadata["unit"]
+            assert f"`{field.name}`" + (f" [{unit}]" if unit != "1" else "") in row
+
+
+def test_missing_numba_is_said(monkeypatch):
+    """Only a nonlinear model needs it."""
+    monkeypatch.setitem(sys.modules, "frac_accel.core.nonlinear_motion", None)
+    monkeypatch.delattr(frac_accel.core, "nonlinear_motion", raising=False)
+    reference = np.sin(np.arange(50.0))
+    assert np.isfinite(simulate(model_with({"cause": "dead_zone", "half_width": 0.1}), reference,
+                                RATE, axis="x")).all()
+    with pytest.raises(FracAccelError, match="numba"):
+        simulate(model_with({"cause": "cubic_stiffness", "alpha3": 0.1}), reference, RATE, axis="x")

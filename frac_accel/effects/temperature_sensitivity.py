@@ -35,8 +35,11 @@ class TemperatureSensitivity(Effect):
 
     def invert(self, values, variance, circumstances):
         """Where no temperature is known yet, it is taken as 25 °C with a wide uncertainty."""
-        gain = self._gain(circumstances.temperature_c)
-        unknown = np.isnan(circumstances.temperature_c)
+        temperature = circumstances.temperature_c
+        if temperature is None:
+            temperature = np.full(len(values), np.nan)
+        gain = self._gain(temperature)
+        unknown = np.isnan(temperature)
         doubt = self.coefficient_per_k * UNKNOWN_STD_K * values
         return values / gain, (variance + np.where(unknown, doubt**2, 0.0)) / gain**2
 
