@@ -19,6 +19,8 @@ _SCATTER = 0.3
 _RARE = 1e-3
 _NEIGHBOURS = 15
 _FIRST_PART = 64
+# Scatter [intervals] of stamps that are as regular as clocks make them.
+_REGULAR = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -238,6 +240,10 @@ def _long_term_rate(stamps):
         length = min(2 * length, len(stamps))
         place = (seconds[:length] - line[1]) / line[0]
         line = np.polyfit(np.round(place), seconds[:length], 1)
+    place = (seconds - line[1]) / line[0]
+    if np.std(place - np.round(place)) < _REGULAR:
+        # the ends say it to the last digit
+        return 1e9 * (np.round(place[-1]) - np.round(place[0])) / float(stamps[-1] - stamps[0])
     return 1e9 / line[0]
 
 

@@ -9,6 +9,7 @@ from ..core import Oscillator
 from ..effects import known_effects
 from ..errors import FracAccelError, IdentificationError
 from ..identification.excitation import learning_length
+from ..identification.record_checks import moving_samples
 from ..model import AXES, SensorModel
 from ..pair import Pair
 from . import integrity
@@ -62,7 +63,10 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     if len(record) < _FEWEST:
         return insufficient(f"the record has {len(record)} samples, expected at least {_FEWEST}",
                             model, found)
+    moving, notes = moving_samples(record.reference[:, column], record.sensor[:, column], record)
+    found.words.extend(notes)
     fixed, used = _limits(found, record, column)
+    used &= moving
     split = learning_length(record.reference[:, column])
     for rows, part in ((used[:split], "before"), (used[split:], "after")):
         if rows.sum() < _FEWEST // 4:

@@ -81,7 +81,7 @@ def check_record(pair, axis="x"):
     notes = [f"{missing} of {len(pair)} instants have no sample in one of the topics"] \
         if missing else []
     notes += _collinear(pair)
-    moving, standing_notes = _moving(reference, sensor, pair)
+    moving, standing_notes = moving_samples(reference, sensor, pair)
     valid, clipping_notes = _unclipped(reference, sensor, moving, pair)
     return RecordCheck(dataclasses.replace(pair, valid=valid), missing,
                        int(np.sum(moving & ~valid)), int(np.sum(pair.valid & ~moving)),
@@ -148,7 +148,7 @@ def _excited(values):
     return np.flatnonzero(spread > 1e-6 * spread.max())
 
 
-def _moving(reference, sensor, pair):
+def moving_samples(reference, sensor, pair):
     """Valid instants without those at which one topic stands still while the other moves."""
     moving, notes = pair.valid.copy(), []
     sensor_runs = _standstills(sensor, reference, pair.valid)
