@@ -232,3 +232,11 @@ def test_stuck_values_are_no_cause(files, tmp_path):
     require_form(said)
     assert any("stands still" in words for words in said["integrity"])
     assert [finding["cause"] for finding in said["findings"]] == ["mounting_resonance"]
+
+
+def test_unrelated_reference_is_refused_without_a_model_too(files, tmp_path, capsys):
+    noise = np.random.default_rng(1).standard_normal
+    source, _ = changed(files, tmp_path, reference=lambda samples: samples._replace(
+        values=noise(samples.values.shape)))
+    assert main(["diagnose", source]) == 2
+    assert "nothing to do with the reference" in capsys.readouterr().err

@@ -8,7 +8,7 @@ from ..bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
 from ..core import Oscillator
 from ..effects import known_effects
 from ..errors import FracAccelError, IdentificationError
-from ..identification.excitation import learning_length
+from ..identification.excitation import learning_length, require_excitation
 from ..identification.record_checks import moving_samples
 from ..model import AXES, SensorModel
 from ..pair import Pair
@@ -21,6 +21,8 @@ from .record import Record
 __all__ = ["Diagnosis", "Finding", "diagnose"]
 
 _FEWEST = 512
+# Coefficients of a classical core with its delay: what the excitation must at least be good for.
+_COEFFICIENTS = 4
 # Parameters of a classical core.
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
@@ -50,7 +52,8 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     Raises
     ------
     FracAccelError
-        If the record cannot be used, or the sensor does not follow the reference.
+        If the record cannot be used, the sensor does not follow the reference, or no classical
+        model can be identified although the excitation would do.
     """
     progress = progress or (lambda words: None)
     if isinstance(source, (str, Path)):
@@ -77,9 +80,10 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     if model is None:
         progress("identifying a classical model")
         try:
-            model, loose, seed = _classical(record, axis, used)
+            require_excitation(record.reference[:, column], record.sampling_rate_hz, _COEFFICIENTS)
         except IdentificationError as error:
             return insufficient(str(error), model, found)
+        model, loose, seed = _classical(record, axis, used)
     else:
         loose = _left_open(model, axis)
     if found.jitter_rms_s:
