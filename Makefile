@@ -1,4 +1,4 @@
-# make setup | demo | test | lint | bench | pins | clean
+# make setup | demo | test | lint | bench | blind | browser | pins | clean
 # Needs Python 3.10 to 3.13, git and make. PYTHON=python3.12 chooses the Python of .venv.
 
 # A ROS that is sourced, or another venv with ROS, must not leak into ours.
@@ -6,7 +6,7 @@ unexport PYTHONPATH LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DELETE_ON_ERROR:
-.PHONY: setup demo test test-oldest lint bench pins clean FORCE
+.PHONY: setup demo test test-oldest lint bench blind browser pins clean FORCE
 
 venv := .venv
 oldest := .venv-oldest
@@ -38,13 +38,25 @@ test: setup lint
 test-oldest: $(oldest)/.done
 	@$(oldest)/bin/python -c 'import numpy, platform, scipy; print("once more with Python", \
 	    platform.python_version(), "numpy", numpy.__version__, "scipy", scipy.__version__)'
-	$(oldest)/bin/python $(numerical)
+	$(oldest)/bin/python $(numerical) -m "not ros and not long"
 
 lint: $(venv)/.done
 	$(python) -m ruff check .
 
 bench: setup
 	for script in benchmarks/*.py; do $(python) $$script || exit; done
+
+# Hours; goes on where it was stopped. BLIND="single --seed-set 1 --first 2" for a part of it.
+blind: export OPENBLAS_NUM_THREADS := 1
+blind: setup
+	PYTHONPATH=test:. $(python) -m blind $(BLIND)
+
+# Without a Chromium the tests of the reports in a browser are skipped. No other target touches the
+# system: this one is for machines that are ours to change, such as those of continuous integration.
+browser:
+	@command -v chromium chromium-browser google-chrome || \
+	    { [ "$$(id -u)" = 0 ] || { echo "no Chromium here, and only root can install it" >&2; \
+	    exit 1; }; apt-get update -q && apt-get install -qy --no-install-recommends chromium; }
 
 pins:
 	for minor in 10 11 12 13; do \

@@ -42,6 +42,7 @@ setup(
         "mcap>=1.6.0",  # Writer.flush
         "tqdm",
         "matplotlib",
+        "plotly>=5.13",
         "numba>=0.57",  # simulation of nonlinear springs and friction
     ],
     entry_points={

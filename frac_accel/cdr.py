@@ -193,6 +193,17 @@ def encode_temperature(stamp_ns: int, celsius: float, variance: float, frame_id:
     return _encode_header(stamp_ns, frame_id) + struct.pack("<2d", celsius, variance)
 
 
+def encode_temperatures(temperatures: Temperatures) -> list[bytes]:
+    """One serialised ``sensor_msgs/Temperature`` per sample."""
+    stamps, celsius, variance, frame_id = temperatures
+    return [
+        encode_temperature(stamp, value, uncertainty, frame_id)
+        for stamp, value, uncertainty in zip(
+            np.asarray(stamps).tolist(), np.asarray(celsius).tolist(), np.asarray(variance).tolist()
+        )
+    ]
+
+
 def patch_samples(
     type_name: str,
     messages: Sequence[bytes],

@@ -15,6 +15,7 @@ VERBS = {
     "identify": "measured pair -> sensor model with standard uncertainties",
     "validate": "error metrics of a model and of its correction",
     "correct": "raw acceleration -> corrected acceleration",
+    "diagnose": "what a simulation gets wrong, the cause, the extension, the gain",
 }
 
 
@@ -33,7 +34,8 @@ def main(arguments=None):
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     parser = argparse.ArgumentParser(
-        prog="frac_accel", description="Simulate, identify, validate and correct accelerometers.",
+        prog="frac_accel",
+        description="Simulate, identify, validate, correct and diagnose accelerometers.",
         epilog="frac_accel VERB --help tells more of each.")
     verbs = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
     try:

@@ -47,9 +47,9 @@ class Convolution:
         return self._s
 
     def response(self, transfer):
-        """Response of a system, shape (n,), from its transfer function at `s`."""
+        """Responses of systems, shape (..., n), from their transfer functions (...) at `s`."""
         spectrum = self._spectrum * _smooth_at_nyquist(transfer)
-        return irfft(spectrum, self._length)[:self._n] * self._undamped(1, self._n)
+        return irfft(spectrum, self._length)[..., :self._n] * self._undamped(1, self._n)
 
     def response_between(self, transfer, factor, count):
         """Response at `factor` times the rate, shape (count,); `count` may exceed the input's end.
@@ -105,12 +105,12 @@ def _smooth_at_nyquist(response):
     Anything else there jumps to its conjugate, and the jump rings through the record from both its
     ends with an amplitude that falls only as 1/n.
     """
-    first = int(0.8 * len(response))
-    ramp = np.linspace(0, 1, len(response) - first)
-    angle = np.angle(response[-1])
+    first = int(0.8 * response.shape[-1])
+    ramp = np.linspace(0, 1, response.shape[-1] - first)
+    angle = np.angle(response[..., -1:])
     excess = angle - np.round(angle / np.pi) * np.pi
     smooth = response.copy()
-    smooth[first:] *= np.exp(-1j * excess * ramp * ramp * (3 - 2 * ramp))
+    smooth[..., first:] *= np.exp(-1j * excess * ramp * ramp * (3 - 2 * ramp))
     return smooth
 
 

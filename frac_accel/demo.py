@@ -1,6 +1,7 @@
-"""Demonstration: a bag is played, corrected live and recorded, over DDS, in separate processes.
+"""Demonstration: a sensor is identified from a bag, which is then played, corrected live with the
+identified model and recorded, over DDS, in separate processes.
 
-``make demo``, or ``python -m frac_accel.demo``. Writes the table and the picture that it shows.
+``make demo``, or ``python -m frac_accel.demo``. Writes the report, table and picture that it shows.
 """
 
 import argparse
@@ -15,36 +16,50 @@ from pathlib import Path
 import numpy as np
 
 from .bag import CORRECTED_TOPIC, RAW_TOPIC, REFERENCE_TOPIC, read_bag
+from .commands._common import provenance
 from .correction import Corrector
 from .errors import FracAccelError
+from .identification import identify
 from .model import AXES, SensorModel
+from .pair import make_pair
+from .parameters import as_mapping
+from .report.identification import identification_page
+from .report.quantity import rounded
 from .validation import compare
 
+# The axis that the model comes from; it then corrects all three.
+AXIS = "x"
 BAGS = Path(__file__).resolve().parent.parent / "bags"
 _PATIENCE_S = 90
+# Of the record, in the picture.
+_SHOWN_S = 0.3
 
 
 def main(arguments=None):
     """Run the demonstration; exit status 0, or 2 with one line that says what went wrong."""
     parser = argparse.ArgumentParser(prog="python -m frac_accel.demo", description=__doc__)
-    parser.add_argument("--bag", default=BAGS / "fractional_bench.mcap", type=Path)
-    parser.add_argument("--model", default=BAGS / "fractional_bench.yaml", type=Path)
+    parser.add_argument("--bag", default=BAGS / "viscoelastic_bench.mcap", type=Path,
+                        help="reference and raw samples; a model file beside it with the same name "
+                             "holds the true parameters, if they are known")
     parser.add_argument("--output-dir", default="demo_output", type=Path)
     chosen = parser.parse_args(arguments)
     try:
-        run(chosen.bag, chosen.model, chosen.output_dir)
+        run(chosen.bag, chosen.output_dir)
     except FracAccelError as error:
         print(f"demo: {error}", file=sys.stderr)
         return 2
     return 0
 
 
-def run(bag, model_file, folder):
-    """Play, correct, record, compare."""
+def run(bag, folder):
+    """Identify, play, correct, record, compare."""
     folder.mkdir(parents=True, exist_ok=True)
-    recorded = folder / "demo.mcap"
+    recorded, model_file = folder / "demo.mcap", folder / "model.yaml"
     recorded.unlink(missing_ok=True)
     measured = read_bag(bag, [REFERENCE_TOPIC, RAW_TOPIC])
+    print(f"identifying the sensor from {bag.name}, axis {AXIS}", flush=True)
+    found = _identify(bag, measured, model_file, folder / "identification.html")
+    print(found, flush=True)
     print(f"playing {bag.name} ({np.ptp(measured[RAW_TOPIC].stamps_ns) * 1e-9:.1f} s) -> corrector "
           f"with {model_file.name} -> recorder", flush=True)
     _live(bag, model_file, recorded)
@@ -60,11 +75,30 @@ def run(bag, model_file, folder):
                for axis in AXES}
     text = table(results, len(live.stamps_ns), len(raw.stamps_ns), same)
     print(text)
-    (folder / "demo.txt").write_text(text + "\n", encoding="utf-8")
+    (folder / "demo.txt").write_text(f"{found}\n\n{text}\n", encoding="utf-8")
     picture(results, folder / "demo.png")
-    print(f"written: {recorded}, {folder / 'demo.txt'}, {folder / 'demo.png'}")
+    written = ("identification.html", model_file.name, recorded.name, "demo.txt", "demo.png")
+    print(f"written to {folder}: {', '.join(written)}")
     if not same:
         raise FracAccelError("the live output is not the offline output")
+
+
+def parameters(result, truth):
+    """Identified parameters beside the true ones, as far as these are known, as text."""
+    known = {}
+    if truth is not None:
+        axis = truth.axis(AXIS)
+        for part in (axis.core, *axis.effects):
+            known.update(as_mapping(part))
+    lines = ["parameter                 identified  standard uncertainty"
+             + ("        true" if known else "")]
+    for name, entry in result.parameters.items():
+        value, std = rounded(entry["value"], entry["std"])
+        true = f"{known[name]:12g}" if name in known else ""
+        lines.append(f"  {name:21} {value:>12}  {std:>20}{true}  {entry['unit']}".rstrip())
+    lines.append(f"residual {result.nrmse:.2%} of the output, {result.held_out_nrmse:.2%} on "
+                 "held-out data")
+    return "\n".join(lines + [f"note: {note}" for note in result.notes])
 
 
 def table(results, live, raw, same):
@@ -88,7 +122,7 @@ def table(results, live, raw, same):
 
 
 def picture(results, path):
-    """The first second: reference, raw and corrected, and what is left."""
+    """The first moments: reference, raw and corrected, and what is left."""
     import matplotlib
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
@@ -96,7 +130,7 @@ def picture(results, path):
                                 width_ratios=(3, 2), layout="constrained")
     for (axis, result), (signals, errors) in zip(results.items(), rows):
         time_s = (result.stamps_ns - result.stamps_ns[0]) * 1e-9
-        first = time_s <= 1.0
+        first = time_s <= _SHOWN_S
         time_s = time_s[first]
         signals.plot(time_s, result.before[first], color="#d98c5f", lw=1, label="raw / sensitivity")
         signals.plot(time_s, result.reference[first], color="black", lw=2.2, label="reference")
@@ -108,12 +142,23 @@ def picture(results, path):
                         lw=0.8)
         errors.set_ylabel("|error| [m/s²]")
     rows[0][0].legend(loc="upper right", ncols=3, fontsize="small")
-    rows[0][0].set_title("acceleration, first second")
+    rows[0][0].set_title(f"acceleration, first {_SHOWN_S} s")
     rows[0][1].set_title("error before and after correction")
     for row in rows[-1]:
         row.set_xlabel("time [s]")
     figure.savefig(path, dpi=100)
     plt.close(figure)
+
+
+def _identify(bag, measured, model_file, report):
+    """Write the model of a bag's sensor and its report; what was found, as text."""
+    source = provenance(bag, "python -m frac_accel.demo")
+    pair = make_pair(measured[REFERENCE_TOPIC], measured[RAW_TOPIC], AXIS)
+    result = identify(pair, AXIS, provenance=source)
+    result.model.save(model_file)
+    identification_page(result, pair, AXIS, source).write(report)
+    truth = bag.with_suffix(".yaml")
+    return parameters(result, SensorModel.load(truth) if truth.is_file() else None)
 
 
 def _live(bag, model_file, recorded):

@@ -3,18 +3,16 @@
 import dataclasses
 import difflib
 import functools
-import os
-import tempfile
-from pathlib import Path
 
 import numpy as np
 import yaml
 
-from .core import CORES
+from .atomic_file import write_text
+from .core import CORES, Arx
 from .core.static_force import StaticForce
 from .effects import Circumstances, Effect, known_effects
 from .errors import ModelError
-from .parameters import as_mapping, build, number, plain
+from .parameters import as_mapping, build, number, parameter_fields, plain
 
 SCHEMA = "frac_accel/sensor_model/1"
 AXES = "xyz"
@@ -315,21 +313,10 @@ class SensorModel:
 
     def save(self, path):
         """Write the model as YAML; the file is complete or not there."""
-        path = Path(path)
         text = yaml.safe_dump(self.to_dict(), sort_keys=False, allow_unicode=True)
-        temporary = None
         try:
-            handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-            with open(handle, "w", encoding="utf-8") as file:
-                file.write(text)
-            # mkstemp makes the file for its owner alone
-            umask = os.umask(0)
-            os.umask(umask)
-            os.chmod(temporary, 0o666 & ~umask)
-            os.replace(temporary, path)
+            write_text(path, text)
         except OSError as error:
-            if temporary:
-                os.unlink(temporary)
             raise ModelError(f"{path}: cannot write the model: {error.strerror}") from None
 
 
@@ -417,6 +404,12 @@ def _core(entry, where):
     kind = entry.pop("type", "oscillator")
     if not isinstance(kind, str) or kind not in CORES:
         raise ModelError(f"{where}.type: {kind!r} given, expected one of {', '.join(CORES)}")
+    if CORES[kind] is not Arx:
+        for field in parameter_fields(Arx):
+            if field.name in entry:
+                raise ModelError(f"{where}.{field.name}: given for a core of type {kind}, but it "
+                                 "belongs to a transfer function in z: expected type: arx; "
+                                 "coefficients in z have no place in an equation in s")
     try:
         return build(CORES[kind], entry, where)
     except ModelError as error:

@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from .bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
 from .correction.timing import estimate_rate
@@ -12,6 +13,14 @@ from .model import AXES
 # Rates of the two topics may differ by this share: what stamps of a short record leave open.
 _SAME_RATE = 1e-3
 _FEWEST = 32
+# Scatter of the stamps [intervals] with which rounding still finds the instants, and the share of
+# samples that may have more.
+_SCATTER = 0.3
+_RARE = 1e-3
+_NEIGHBOURS = 15
+_FIRST_PART = 64
+# Scatter [intervals] of stamps that are as regular as clocks make them.
+_REGULAR = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,7 +103,7 @@ def make_pair(reference, sensor, axis="x"):
                              "expected the same rate: resample one of them first")
     interval = 1e9 / rate
     start = int(usable["reference"][0][0])
-    slots = {name: np.round((stamps - start) / interval) for name, (stamps, _) in usable.items()}
+    slots = {name: slots_of((stamps - start) / interval) for name, (stamps, _) in usable.items()}
     # jitter averages out of the mean; a common clock offset between the two topics stays
     lag = float(np.median(usable["sensor"][0] - start - slots["sensor"] * interval)
                 - np.median(usable["reference"][0] - start - slots["reference"] * interval))
@@ -192,12 +201,50 @@ def _good(samples):
     return good
 
 
+def slots_of(place):
+    """Whole instants that samples belong to.
+
+    Parameters
+    ----------
+    place : ndarray, shape (n,)
+        Stamps in sampling intervals, ascending.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Whole numbers. Where stamps scatter so much that rounding would put two samples on one
+        instant, what is lost between the samples is counted by the median of neighbours.
+    """
+    nearest = np.round(place)
+    scatter = place - nearest
+    scatter = scatter - np.median(scatter)
+    if np.mean(np.abs(scatter) > _SCATTER) < _RARE:
+        return nearest
+    count = np.arange(len(place))
+    lost = np.round(median_filter(place - count, _NEIGHBOURS, mode="nearest"))
+    return count + np.maximum.accumulate(lost)
+
+
 def _long_term_rate(stamps):
-    """Rate over the whole record: the short-term estimate says how many intervals it holds."""
+    """Rate over the whole record, by lines fitted to ever longer parts of it.
+
+    Each line says to which instants the stamps of the next part belong, however they scatter.
+    """
     interval = 1e9 / estimate_rate(stamps)
-    # count interval by interval: over the whole record an error of the estimate adds up
-    counts = np.maximum(np.round(np.diff(stamps) / interval), 1)
-    return 1e9 * counts.sum() / float(stamps[-1] - stamps[0])
+    seconds = (stamps - stamps[0]).astype(float)
+    length = min(len(stamps), _FIRST_PART)
+    # count interval by interval: what a longer part would add up, a short one cannot
+    counts = np.maximum(np.round(np.diff(stamps[:length]) / interval), 1)
+    line = np.polyfit(np.r_[0, np.cumsum(counts)], seconds[:length], 1)
+    while length < len(stamps):
+        length = min(2 * length, len(stamps))
+        place = (seconds[:length] - line[1]) / line[0]
+        line = np.polyfit(np.round(place), seconds[:length], 1)
+    place = (seconds - line[1]) / line[0]
+    if np.std(place - np.round(place)) < _REGULAR:
+        # the ends say it to the last digit
+        return 1e9 * (np.round(place[-1]) - np.round(place[0])) / float(stamps[-1] - stamps[0])
+    return 1e9 / line[0]
 
 
 def _seconds(stamps):

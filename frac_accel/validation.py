@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from .correction import Corrector
-from .correction.design import reference_gain
+from .correction.design import plateau
 from .errors import FracAccelError
 from .identification.excitation import excited_band
 from .metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
@@ -151,7 +151,7 @@ def compare(reference, sensor, corrected, design, axis="x"):
         raise FracAccelError("the reference has no power in the band of the correction, "
                              f"{band[0]:.4g} Hz to {band[1]:.4g} Hz")
     bands = octave_bands(low, high)
-    scaled = raw / plateau(design.model.axis(axis))
+    scaled = raw / plateau(design.model.axis(axis), design.model.band_hz)
     return Comparison(
         raw=error_metrics(truth_raw, raw, rate, bands),
         scaled=error_metrics(truth_raw, scaled, rate, bands),
@@ -185,12 +185,6 @@ def _simulated(model, pair, column, temperature_at):
                           pair.sampling_rate_hz)[:, column]
     run = _longest_run(np.isfinite(shifted) & pair.valid, instants, pair.sampling_rate_hz)
     return pair.sensor[run, column], shifted[run]
-
-
-def plateau(axis):
-    """Gain of an axis on its plateau, with its polarity."""
-    core = axis.effective_core
-    return reference_gain(axis) * np.sign(getattr(core, "sensitivity", 1.0))
 
 
 def _longest_run(good, stamps_ns, rate):

@@ -37,9 +37,10 @@ def run(script, folder, **kwargs):
     script = re.sub(r"\bros2 run frac_accel (\w+)", rf"{sys.executable} -m frac_accel.nodes.\1",
                     script)
     kwargs.setdefault("env", {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(ROOT), "HOME": "/tmp"})
-    result = subprocess.run(["bash", "-c", script], cwd=folder, text=True, timeout=120,
+    result = subprocess.run(["bash", "-c", script], cwd=folder, timeout=120,
                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **kwargs)
-    return result.stdout
+    # progress takes itself back
+    return re.sub(r"[^\n]*\r", "", result.stdout.decode())
 
 
 def same(shown, printed, tolerance=0.03):

@@ -11,11 +11,11 @@ RECORDS = ("shock_ptb", "mems_package_sweep", "shaking_table_earthquake-test1",
            "shaking_table_earthquake-test5", "shaking_table_earthquake-test9")
 
 
-def figures(name):
+def figures(name, structure="oscillator"):
     """Identification of one record, and the validation of its model."""
     bag = FOLDER / f"{name}.mcap"
     topics = read_bag(bag, [REFERENCE_TOPIC, RAW_TOPIC])
-    result = identify(bag, structure="oscillator")
+    result = identify(bag, structure=structure)
     return result, validate(topics[REFERENCE_TOPIC], topics[RAW_TOPIC], result.model)
 
 

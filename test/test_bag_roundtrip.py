@@ -14,6 +14,7 @@ from frac_accel.bag import (
     BagWriter,
     Qos,
     Samples,
+    Temperatures,
     read_bag,
     read_temperature,
     write_bag,
@@ -141,6 +142,21 @@ def test_point_cloud_accel_stamped_and_temperature_topics(tmp_path):
     temperature = read_temperature(tmp_path / "bag.mcap")
     assert temperature.celsius.tolist() == [25.0 + i for i in range(0, 1000, 100)]
     assert temperature.stamps_ns.tolist() == samples.stamps_ns[::100].tolist()
+
+
+def test_temperatures_beside_samples(tmp_path):
+    samples = TOPICS["/imu/data_raw"]
+    variance = np.full(25, np.nan)
+    variance[3] = 0.5
+    written = Temperatures(samples.stamps_ns[::100], np.linspace(-10, 60, 25), variance, "housing")
+    write_bag(tmp_path / "bag.mcap", {"/imu/data_raw": samples, "/imu/temperature": written})
+    assert_equal(read_bag(tmp_path / "bag.mcap")["/imu/data_raw"], samples)
+    read = read_temperature(tmp_path / "bag.mcap")
+    assert read.frame_id == "housing"
+    for one, other in zip(read[:3], written[:3]):
+        np.testing.assert_array_equal(one, other)
+    stamps = [message.log_time_ns for message in BagReader(tmp_path / "bag.mcap").messages()]
+    assert stamps == sorted(stamps) and len(stamps) == 2525
 
 
 def test_topics_are_copied_as_they_are(tmp_path):

@@ -13,6 +13,8 @@ from frac_accel.errors import DesignError
 from frac_accel.metrics import error_metrics, interpolate
 from frac_accel.model import SensorModel
 
+pytestmark = pytest.mark.long
+
 RATE = 1000.0
 SPRING = ("cubic_stiffness", "quadratic_stiffness", "hysteresis")
 KNOWN = ("core_parameter_shift", "clock_skew", "gain_drift", "temperature_sensitivity")

@@ -8,7 +8,7 @@ from random_models import draw_sensor, model_of
 from scipy.signal import lfilter
 
 from frac_accel import design_inverse
-from frac_accel.correction.design import TOLERANCE, design_simulator, reference_gain
+from frac_accel.correction.design import TOLERANCE, design_simulator, plateau, reference_gain
 from frac_accel.correction.filter import FilterState
 from frac_accel.errors import DesignError, FracAccelError
 from frac_accel.model import SensorModel
@@ -243,3 +243,30 @@ def test_recursion_alone_equals_scipy_for_a_known_filter():
     lead = axis.filter.lead
     expected = np.r_[np.zeros(lead), expected[:3000 - lead]]
     np.testing.assert_allclose(run(axis.filter, x), expected.real, atol=1e-8)
+
+
+def test_band_is_judged_by_the_gain_where_the_model_was_identified():
+    """Below its band a model in z may do anything: here it is a hundred times as large."""
+    rng = np.random.default_rng(260)
+    for _ in range(5):
+        sensitivity = rng.choice([-1, 1]) * rng.uniform(0.2, 5.0)
+        slow, zero = np.exp(-2 * np.pi * np.array([0.01, 1.0]) / 1000.0)
+        core = {"type": "arx", "numerator": [sensitivity, -sensitivity * zero],
+                "denominator": [1.0, -slow], "sampling_rate_hz": 1000.0}
+        data = {"schema": "frac_accel/sensor_model/1", "core": core}
+        axis = SensorModel.from_dict(data).axis("x")
+        assert plateau(axis) == pytest.approx(sensitivity * (1 - zero) / (1 - slow), rel=1e-6)
+        known = SensorModel.from_dict({**data, "band_hz": [20.0, 200.0]})
+        assert plateau(axis, known.band_hz) == pytest.approx(sensitivity, rel=0.01)
+        assert design_inverse(known, 1000.0).axes[0].band_hz[1] == 200.0
+        # without a band the static gain stands for the plateau, and most of the band is lost
+        assert design_inverse(SensorModel.from_dict(data), 1000.0).axes[0].band_hz[1] < 1.0
+
+
+def test_plateau_of_an_oscillator_is_its_sensitivity_in_any_band():
+    for sensitivity in (-0.3, 2.0):
+        model = SensorModel.from_dict({
+            "schema": "frac_accel/sensor_model/1",
+            "core": {"natural_frequency_hz": 300.0, "damping_ratio": 0.1,
+                     "sensitivity": sensitivity}})
+        assert plateau(model.axis("x"), [250.0, 600.0]) == sensitivity

@@ -174,6 +174,13 @@ BAD = [
     (arx_of(numerator=[0.0]), ["core.numerator", "only zeros"]),
     (arx_of(numerator=[1.0, 2.0, 3.0]), ["core.numerator", "3 coefficients", "at most"]),
     (arx_of(sampling_rate_hz=0), ["core.sampling_rate_hz", "0 given"]),
+    (arx_of(sampling_rate_hz=None), ["core.sampling_rate_hz", "None given", "Hz"]),
+    (data_of(core={"type": "arx", "numerator": [0.5], "denominator": [1.0, -0.5]}),
+     ["core.sampling_rate_hz", "missing", "Hz"]),
+    # coefficients in z for an equation in s
+    (arx_of(type="fractional_transfer_function"), ["core.numerator", "in z", "type: arx"]),
+    (fractional_of(sampling_rate_hz=1000.0), ["core.sampling_rate_hz", "in z", "type: arx"]),
+    (core_of(denominator=[1.0, -0.5]), ["core.denominator", "oscillator", "in z", "type: arx"]),
     # fractional transfer function
     (fractional_of(denominator_coefficients=[1e-6, -1e-3, 1.0]),
      ["core.denominator_coefficients", "unstable"]),

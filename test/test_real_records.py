@@ -12,7 +12,22 @@ def test_shock_sensitivity_agrees_with_the_sinusoidal_calibration():
     """0.22708 pC/(m/s^2) at 500 Hz, by another method and laboratory procedure."""
     result, _ = real_records.figures("shock_ptb")
     assert result.parameters["sensitivity"]["value"] == pytest.approx(0.22708, rel=2e-3)
-    assert any("something real is missing" in note for note in result.notes)
+    assert "depends on the reference" in result.validation.verdict[0]
+
+
+def test_a_shock_can_be_described_in_z():
+    """Its end is quieter and slower than its beginning, and no measure of the beginning's model."""
+    result, validation = real_records.figures("shock_ptb", "arx")
+    _, seismic = real_records.figures("shock_ptb")
+    assert result.structure == "arx"
+    assert validation.simulation.total.nrmse < seismic.simulation.total.nrmse
+
+
+def test_sweep_is_corrected_over_its_band_by_the_structure_that_auto_chooses():
+    result, validation = real_records.figures("mems_package_sweep", "auto")
+    assert result.structure == "arx" and "clearly better" in result.reason
+    assert validation.comparison.corrected.total.band_hz[1] > 30.0
+    assert validation.comparison.corrected.total.nrmse < 0.02
 
 
 @pytest.mark.parametrize("name", real_records.RECORDS)

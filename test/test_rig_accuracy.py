@@ -219,6 +219,13 @@ def test_classical_nonlinear_terms_against_an_adaptive_solver(terms, tolerance):
     assert relative_rms(q[::64] - adaptive, adaptive) < tolerance
 
 
+def test_a_spring_that_cannot_hold_the_mass_is_reported():
+    t = np.arange(6401) / 6400
+    for hysteresis in ((0.0, 0.0, 0.0), (0.3, 1.5, -0.5)):
+        with pytest.raises(FloatingPointError):
+            integrate(np.sin(40 * t) ** 3, t[1], 30.0, 0.1, alpha2=-1.0, hysteresis=hysteresis)
+
+
 def test_friction_holds_the_mass_below_its_level():
     t = np.arange(6401) / 6400
     motion = integrate(0.99 * np.sin(40 * t) ** 3, t[1], 30.0, 0.1, coulomb_level=1.0)
@@ -288,7 +295,10 @@ def test_truth_is_a_model_file_of_plain_values(kind):
 
 
 def test_rig_shares_nothing_with_the_package():
+    """Only `hidden.py` knows it, to hand a finished record over in the package's own types."""
     for path in pathlib.Path(rig.__file__).parent.glob("*.py"):
+        if path.name == "hidden.py":
+            continue
         for node in ast.walk(ast.parse(path.read_text())):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else (
                 [node.module or ""] if isinstance(node, ast.ImportFrom) else [])

@@ -81,9 +81,10 @@ def read_temperature(path: str | Path, topic: str = TEMPERATURE_TOPIC) -> Temper
     return Temperatures(*(np.concatenate(column) for column in columns), blocks[0].frame_id)
 
 
-def write_bag(path: str | Path, topics: Mapping[str, Samples]) -> None:
-    """Write whole topics as ``sensor_msgs/msg/Imu``, interleaved by their stamps.
+def write_bag(path: str | Path, topics: Mapping[str, Samples | Temperatures]) -> None:
+    """Write whole topics, interleaved by their stamps.
 
+    Samples are written as ``sensor_msgs/msg/Imu``, temperatures as ``sensor_msgs/msg/Temperature``.
     The log time is the latest stamp so far, so that a stamp that goes back keeps its place.
 
     Parameters
@@ -99,13 +100,16 @@ def write_bag(path: str | Path, topics: Mapping[str, Samples]) -> None:
         for name in names
     ]
     with BagWriter(path) as writer:
-        for name in names:
-            writer.add_topic(name, cdr.IMU)
+        messages: list[bytes] = []
+        for name, content in topics.items():
+            if isinstance(content, Temperatures):
+                writer.add_topic(name, cdr.TEMPERATURE)
+                messages += cdr.encode_temperatures(content)
+            else:
+                writer.add_topic(name, cdr.IMU)
+                messages += cdr.encode_samples(cdr.IMU, content)
         if not names:
             return
-        messages: list[bytes] = []
-        for name in names:
-            messages += cdr.encode_samples(cdr.IMU, topics[name])
         all_numbers, all_times = np.concatenate(numbers), np.concatenate(log_times)
         order = np.argsort(all_times, kind="stable")
         for i, number, time_ns in zip(

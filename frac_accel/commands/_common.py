@@ -13,6 +13,7 @@ from tqdm import tqdm
 from ..bag import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC, BagReader
 from ..errors import BagError, FracAccelError
 from ..parameters import plain
+from ..report import require_plotly
 
 
 def add_bag(parser):
@@ -88,6 +89,12 @@ def add_json(parser):
     parser.add_argument("--json", metavar="FILE", help="also write the result as JSON")
 
 
+def add_report(parser):
+    """Result as a page."""
+    parser.add_argument("--report", metavar="R.html",
+                        help="also write the result as one HTML page with interactive figures")
+
+
 def positive(text):
     """Type of an option: a finite number above 0."""
     try:
@@ -126,6 +133,13 @@ def require_output(path, *inputs):
             raise BagError(f"{path}: is the input, expected another file for the output")
     if not path.absolute().parent.is_dir():
         raise BagError(f"{path}: the folder {path.absolute().parent} does not exist")
+
+
+def require_report(path, *inputs):
+    """Refuse a report that could not be written, before the work that it is to tell of."""
+    if path is not None:
+        require_output(path, *inputs)
+        require_plotly()
 
 
 def progress(total, unit="msg"):

@@ -1,15 +1,23 @@
-"""Identify a sensor model from a measured pair, with standard uncertainties."""
+"""Identify a sensor model from a measured pair, with standard uncertainties.
+
+Of several bags of one sensor, each gets a model that is judged on all others; the result is their
+mean, and whether they agree is said.
+"""
+
+from pathlib import Path
 
 from ..identification import STRUCTURES, identify
 from ..pair import load_pair
+from ..report.identification import identification_page
 from ._common import (
-    add_bag,
     add_json,
+    add_report,
     add_topics,
     open_bag,
     progress,
     provenance,
     require_output,
+    require_report,
     step,
     write_json,
 )
@@ -17,35 +25,74 @@ from ._common import (
 
 def add_arguments(parser):
     """Options of the verb."""
-    add_bag(parser)
+    parser.add_argument("bags", metavar="BAG", nargs="+", help="bare .mcap file or rosbag2 folder")
     parser.add_argument("--structure", choices=STRUCTURES, default="auto",
                         help="form of the model; auto chooses on held-out data "
                              "(default: %(default)s)")
     parser.add_argument("-o", "--output", required=True, metavar="M.yaml", help="model to write")
+    add_report(parser)
     add_topics(parser)
     add_json(parser)
 
 
 def run(arguments):
     """Do it."""
-    require_output(arguments.output, arguments.bag)
-    open_bag(arguments.bag)
-    pair = load_pair(arguments.bag, arguments.reference, arguments.sensor, arguments.axis)
-    command = (f"frac_accel identify {arguments.bag} --structure {arguments.structure} --reference "
-               f"{arguments.reference} --sensor {arguments.sensor} --axis {arguments.axis}")
+    bags = arguments.bags
+    require_output(arguments.output, *bags)
+    require_report(arguments.report, *bags)
+    for bag in bags:
+        open_bag(bag)
+    pairs = [load_pair(bag, arguments.reference, arguments.sensor, arguments.axis) for bag in bags]
+    command = (f"frac_accel identify {' '.join(bags)} --structure {arguments.structure} "
+               f"--reference {arguments.reference} --sensor {arguments.sensor} "
+               f"--axis {arguments.axis}")
+    source = _provenance(bags, command)
     with progress(None, unit="step") as bar:
-        result = identify(pair, arguments.axis, arguments.structure,
-                          provenance(arguments.bag, command), lambda words: step(bar, words))
+        result = identify(pairs, arguments.axis, arguments.structure, source,
+                          lambda words: step(bar, words), [Path(bag).name for bag in bags])
     result.model.save(arguments.output)
-    low, high = result.model.band_hz
-    print(f"{len(pair)} samples at {pair.sampling_rate_hz:.6g} Hz, excited from {low:.4g} to "
-          f"{high:.4g} Hz")
+    _print(result, pairs, bags)
+    print(f"{arguments.output}: written")
+    if arguments.report:
+        identification_page(result, pairs[0], arguments.axis, source).write(arguments.report)
+        print(f"{arguments.report}: written")
+    write_json(arguments.json, result.as_dict())
+
+
+def _print(result, pairs, bags):
+    for bag, pair in zip(bags, pairs):
+        name = f"{Path(bag).name}: " if len(bags) > 1 else ""
+        print(f"{name}{len(pair)} samples at {pair.sampling_rate_hz:.6g} Hz")
+    print(result.excitation.words)
+    if result.excitation.kind == "multisine" and result.points and result.points.distortion:
+        print(result.points.distortion["words"])
     print(f"{result.structure}: {result.reason}")
     for name, entry in result.parameters.items():
         print(f"  {name:21} {entry['value']:12.6g} +- {entry['std']:.2g} {entry['unit']}")
     print(f"  residual {result.nrmse:.3%} of the output, {result.held_out_nrmse:.3%} on held-out "
           "data")
+    if result.validation.records:
+        print(_table(result.validation.records))
+    for line in result.validation.verdict:
+        print(f"verdict: {line}")
     for note in result.notes:
         print(f"note: {note}")
-    print(f"{arguments.output}: written")
-    write_json(arguments.json, result.as_dict())
+
+
+def _provenance(bags, command):
+    """Where the first bag comes from, as for one; the others' names and hashes beside it."""
+    first, *others = [provenance(bag, command) for bag in bags]
+    if others:
+        first["further_bags"] = [{key: other[key] for key in ("bag", "sha256")}
+                                 for other in others]
+    return first
+
+
+def _table(records):
+    """Each record's model on each record, as text."""
+    head = "model of, judged on"
+    width = max(map(len, (*records.records, head)))
+    rows = [*zip(records.records, records.nrmse), ("all together", records.combined_nrmse)]
+    lines = [[f"{head:{width}}", *(f"{name:>{width}}" for name in records.records)]]
+    lines += [[f"{name:{width}}", *(f"{value:{width}.3%}" for value in row)] for name, row in rows]
+    return "\n".join("  ".join(["", *line]) for line in lines)

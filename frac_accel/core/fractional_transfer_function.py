@@ -81,6 +81,10 @@ class FractionalTransferFunction:
 
     def require_stable(self, where):
         """Raise ModelError where a pole lies in the right half-plane or on its edge."""
+        values, orders = self._present("denominator")
+        # such terms all lie in one half-plane, and not all on its edge: they cannot cancel
+        if values.min() > 0 and orders.max() <= 2 and np.any((orders > 0) & (orders < 2)):
+            return
         count = principal_sheet.count_right_half_plane_zeros(*self._side("denominator"))
         if count > 0.25:
             raise ModelError(f"{where}.denominator_coefficients: unstable, {max(1, round(count))} "

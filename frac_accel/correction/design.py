@@ -5,7 +5,7 @@ import functools
 
 import numpy as np
 
-from ..core import Arx
+from ..core import Arx, Oscillator
 from ..effects import Circumstances
 from ..errors import DesignError, FracAccelError
 from ..model import AXES
@@ -20,6 +20,8 @@ NYQUIST_SHARE = 0.6
 TOLERANCE = 2e-3
 # Without a permitted delay: the shortest whose noise gain is this close to that of a brick wall.
 NOISE_EXCESS = 1.3
+# Ratio of a band's edges over which a plateau is looked for where the band begins at zero.
+_WIDEST = 1000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -121,8 +123,7 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
             _positive(value, name)
     model.remove_sample_effects(np.zeros((1, 3)), Circumstances.at_rest(1))  # refuses singular ones
     ratio = _clock_ratio(model)
-    known = model.band_hz[1] if model.band_hz else np.inf
-    bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz, known)
+    bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz, model.band_hz)
              for name, axis in zip(AXES, model.axes)]
     # stamps are whole nanoseconds; what is left of the delay is done by the filters
     sensor_delay_ns = int(np.ceil(max(axis.delay_s for axis in model.axes) * 1e9 - 1e-3))
@@ -199,7 +200,7 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
     def problem(axis):
         return FilterProblem(axis.transfer_function, axis.poles(), rate,
                         (0.0, NYQUIST_SHARE * rate / 2), axis.delay_s * rate + wait,
-                        floor=0.01 * reference_gain(axis))
+                        floor=0.01 * reference_gain(axis, model.band_hz))
 
     problems = [problem(axis) for axis in model.axes]
     delay = _choose_delay(list(dict.fromkeys(problems)), rate, None, tolerance)
@@ -283,12 +284,12 @@ def _positive(value, name):
     return float(value)
 
 
-def _band(axis, name, rate, bandwidth_hz, lowest_hz, known_hz):
+def _band(axis, name, rate, bandwidth_hz, lowest_hz, known_band_hz):
     """Lowest and highest frequency [Hz] of the correction of one axis."""
     nyquist = rate / 2
     core = axis.effective_core
     top = min(nyquist, core.sampling_rate_hz / 2) if isinstance(core, Arx) else nyquist
-    reference = reference_gain(axis)
+    reference = reference_gain(axis, known_band_hz)
     if not reference > 0:
         raise DesignError(f"axis {name}: the model's gain is zero, there is nothing to invert")
     grid = np.geomspace(0.1 * LOWEST_SHARE * rate, NYQUIST_SHARE * top, 8000)
@@ -305,13 +306,44 @@ def _band(axis, name, rate, bandwidth_hz, lowest_hz, known_hz):
     last = first + (int(after[0]) if len(after) else len(grid) - first) - 1
     low = 0.0 if first == 0 else float(grid[first])
     low = low if lowest_hz is None else float(lowest_hz)
-    high = min(float(grid[last]), known_hz) if bandwidth_hz is None else float(bandwidth_hz)
+    known = known_band_hz[1] if known_band_hz else np.inf
+    high = min(float(grid[last]), known) if bandwidth_hz is None else float(bandwidth_hz)
     if low >= high:
         raise DesignError(f"axis {name}: the band from {low:.4g} Hz to {high:.4g} Hz is empty")
     return low, high
 
 
-def reference_gain(axis):
-    """Gain of an axis on its plateau [output units per m/s²]."""
-    links = (axis.effective_core, *axis.effects)
-    return float(np.prod([link.reference_gain() for link in links]))
+def plateau(axis, band_hz=None):
+    """Gain of an axis on its plateau, with its polarity [output units per m/s²].
+
+    An oscillator's plateau is known wherever it was identified. Another core means nothing outside
+    the band in which it was identified: its gain is the median over that band, octave by octave.
+
+    Parameters
+    ----------
+    axis : AxisModel
+    band_hz : sequence of float, optional
+        Band in which the model was identified.
+
+    Returns
+    -------
+    float
+    """
+    core = axis.effective_core
+    if isinstance(core, Oscillator):
+        own = core.sensitivity
+    elif band_hz is None:
+        # the polarity of the limit, since orders below zero leave s = 0 itself undefined
+        own = np.copysign(core.reference_gain(),
+                          core.transfer_function(np.array([1e-9 + 0j]))[0].real)
+    else:
+        low, high = band_hz
+        frequency = np.geomspace(max(low, high / _WIDEST), high, 500)
+        response = core.transfer_function(2j * np.pi * frequency)
+        own = np.copysign(np.median(np.abs(response)), np.median(response.real))
+    return float(own * np.prod([effect.reference_gain() for effect in axis.effects]))
+
+
+def reference_gain(axis, band_hz=None):
+    """Size of `plateau`."""
+    return abs(plateau(axis, band_hz))

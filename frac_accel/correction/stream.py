@@ -16,6 +16,8 @@ from .timing import LARGEST, RATE_SAMPLES, SampleClock, estimate_rate
 HISTORY = 4096
 # Most samples that are held while their stamps do not advance.
 HELD = 100_000
+# Largest stamp that an int64 can hold.
+LARGEST_STAMP_NS = 2**63 - 1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -327,7 +329,9 @@ class Stream:
         if self._record_start_ns is None:
             self._record_start_ns = int(stamps_ns[0])
         elif stamps_ns[0] < self._record_end_ns:
-            self._record_start_ns -= self._record_end_ns - int(stamps_ns[0])
+            # absurd stamps may add up to more than a stamp can be
+            moved = self._record_start_ns - self._record_end_ns + int(stamps_ns[0])
+            self._record_start_ns = min(max(moved, -LARGEST_STAMP_NS), LARGEST_STAMP_NS)
         self._record_end_ns = int(stamps_ns[-1])
 
     def _forget(self):

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import CONDITIONER, Effect
+from .fit_starts import grid
 
 
 @dataclasses.dataclass(frozen=True)
@@ -15,6 +16,8 @@ class AcCoupling(Effect):
     cause = "ac_coupling"
     stage = CONDITIONER
     explanation = "The conditioner is coupled through a high-pass, so slow motion is lost."
+    experiment = ("Hold a constant acceleration, such as gravity after turning the sensor over: "
+                  "behind a high-pass the output returns to zero.")
 
     corner_hz: float = parameter("Hz", above=0)
 
@@ -26,3 +29,7 @@ class AcCoupling(Effect):
 
     def zeros(self):
         return np.array([0.0])
+
+    @classmethod
+    def starts(cls, view):
+        return grid([cls(corner) for corner in view.rate * np.geomspace(5e-2, 2e-6, 18)])

@@ -51,6 +51,27 @@ class Effect:
     stage: ClassVar[int]
     explanation: ClassVar[str]
     needs_temperature: ClassVar[bool] = False
+    # what separates this cause from its rivals where a record cannot
+    experiment: ClassVar[str] = "Repeat with a wider band, and at half and at twice the level."
+
+    # True for what is read off a record's stamps and values, and never fitted
+    read_off: ClassVar[bool] = False
+
+    @classmethod
+    def starts(cls, view):
+        """Where a fit of this cause to a record may begin.
+
+        Parameters
+        ----------
+        view : diagnosis.search.View
+            What the search knows so far.
+
+        Returns
+        -------
+        list of Start
+            Of `fit_starts`; none where the record cannot show this cause.
+        """
+        return []
 
     def pure_delay_s(self):
         """Time [s] by which this effect moves the signal as it is."""

@@ -14,8 +14,10 @@ class Clipping(Effect):
     """Values beyond the limits come out as the limits."""
 
     cause = "clipping"
+    read_off = True
     stage = CLIPPING
     explanation = "Values beyond the sensor's range are cut off."
+    experiment = "Repeat at half the level: nothing is cut then, and the output follows again."
 
     lower: float = parameter("output units")
     upper: float = parameter("output units")

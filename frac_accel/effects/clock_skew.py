@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import DELAY, Effect
+from .fit_starts import finite, free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -13,9 +14,15 @@ class ClockSkew(Effect):
     cause = "clock_skew"
     stage = DELAY
     explanation = "The sensor's clock runs at another rate than the reference's."
+    experiment = ("Record longer, with a sharp event at the beginning and at the end: a skew lets "
+                  "the lag grow from one to the other.")
 
     # no crystal is off by more than this
     skew_ppm: float = parameter("1e-6", minimum=-10_000, maximum=10_000)
 
     def clock_ratio(self):
         return 1 + 1e-6 * self.skew_ppm
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(1.0), "skew_ppm"), finite(cls(100.0)), finite(cls(-100.0))]

@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import CORE, Effect, require_oscillator
+from .fit_starts import Start
 
 
 @dataclasses.dataclass(frozen=True)
@@ -13,6 +14,8 @@ class CoreParameterShift(Effect):
     cause = "core_parameter_shift"
     stage = CORE
     explanation = "The sensor's natural frequency and damping are no longer those of the model."
+    experiment = ("Sweep across the resonance: place and width of the peak give frequency and "
+                  "damping by themselves.")
 
     natural_frequency_hz: float = parameter("Hz", above=0, maximum=1e8)
     damping_ratio: float = parameter("1", above=0, maximum=100)
@@ -22,3 +25,9 @@ class CoreParameterShift(Effect):
         return dataclasses.replace(require_oscillator(core, self.cause),
                                    natural_frequency_hz=self.natural_frequency_hz,
                                    damping_ratio=self.damping_ratio)
+
+    @classmethod
+    def starts(cls, view):
+        frequency, ratio = view.core.natural_frequency_hz, view.core.damping_ratio
+        return [Start(cls(1.003 * frequency, 1.01 * ratio),
+                      (cls(1.003 * frequency, ratio), cls(frequency, 1.01 * ratio)), "free")]

@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import CORE, Effect, require_oscillator
+from .fit_starts import positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -13,6 +14,8 @@ class CoulombFriction(Effect):
     cause = "coulomb_friction"
     stage = CORE
     explanation = "Dry friction holds the seismic mass until the force on it exceeds a level."
+    experiment = ("Repeat at a tenth of the level: friction does not shrink with the motion, and "
+                  "in the end holds the mass altogether.")
 
     level: float = parameter("output units", minimum=0)
 
@@ -21,3 +24,7 @@ class CoulombFriction(Effect):
 
     def add_force(self, force):
         return dataclasses.replace(force, friction_level=force.friction_level + self.level)
+
+    @classmethod
+    def starts(cls, view):
+        return [positive(cls(0.01 * view.level), "level")]

@@ -8,6 +8,7 @@ import numpy as np
 from ..errors import ModelError
 from ..parameters import parameter
 from .base import CROSS_AXIS, Effect
+from .fit_starts import Start
 
 
 @dataclasses.dataclass(frozen=True)
@@ -17,6 +18,8 @@ class CrossAxisSensitivity(Effect):
     cause = "cross_axis_sensitivity"
     stage = CROSS_AXIS
     explanation = "The sensor also answers to motion across its axis."
+    experiment = ("Move in one direction across the axis at a time, with the axis itself at rest: "
+                  "what it still shows came across.")
 
     x: float = parameter("1", minimum=-1, maximum=1, default=0.0)
     y: float = parameter("1", minimum=-1, maximum=1, default=0.0)
@@ -53,3 +56,9 @@ def _inverse(by_axis):
 def _mix(values, matrix):
     """values @ matrix.T, summed in a fixed order: BLAS would round by the block's length."""
     return sum(values[:, [axis]] * matrix[:, axis] for axis in range(3))
+
+    @classmethod
+    def starts(cls, view):
+        others = [axis for axis in "xyz" if view.excited[axis] and axis != view.axis]
+        return [Start(cls(**dict.fromkeys(others, 1e-3)),
+                      tuple(cls(**{axis: 1e-3}) for axis in others), "free")] if others else []

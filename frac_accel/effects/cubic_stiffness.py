@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import CORE, Effect, require_oscillator
+from .fit_starts import free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -13,6 +14,8 @@ class CubicStiffness(Effect):
     cause = "cubic_stiffness"
     stage = CORE
     explanation = "The spring hardens (or softens) at large displacement, the same both ways."
+    experiment = ("Repeat at half and at twice the level: the deviation grows with the cube of "
+                  "the level.")
 
     alpha3: float = parameter("1/(output units)^2")
 
@@ -21,3 +24,7 @@ class CubicStiffness(Effect):
 
     def add_force(self, force):
         return force.with_power(3, self.alpha3)
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(1e-3 / view.level**2), "alpha3")]

@@ -7,6 +7,7 @@ from scipy.special import erf
 
 from ..parameters import parameter
 from .base import DEAD_ZONE, Effect
+from .fit_starts import positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -16,6 +17,8 @@ class DeadZone(Effect):
     cause = "dead_zone"
     stage = DEAD_ZONE
     explanation = "Small signals give no output, and larger ones lose the same amount."
+    experiment = ("Repeat at a tenth of the level: a dead zone takes the same amount from every "
+                  "swing, and all of a small one.")
 
     half_width: float = parameter("output units", minimum=0)
 
@@ -29,3 +32,7 @@ class DeadZone(Effect):
         sign = np.where(variance > 0, sign, np.sign(values))
         doubt = self.half_width**2 / 3 * (1 - sign**2)
         return values + sign * self.half_width, variance + doubt
+
+    @classmethod
+    def starts(cls, view):
+        return [positive(cls(share * view.level), "half_width") for share in (0.01, 0.05, 0.2)]

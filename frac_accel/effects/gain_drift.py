@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import GAIN, Effect
+from .fit_starts import free
 
 _LEAST = 1e-3
 
@@ -17,6 +18,7 @@ class GainDrift(Effect):
     cause = "gain_drift"
     stage = GAIN
     explanation = "The sensitivity drifts with time."
+    experiment = "Keep level and temperature constant for longer: a drift goes on with time."
 
     rate_per_s: float = parameter("1/s")
 
@@ -31,3 +33,7 @@ class GainDrift(Effect):
 
     def _gain(self, circumstances):
         return 1 + self.rate_per_s * circumstances.time_s
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(1e-3), "rate_per_s")]

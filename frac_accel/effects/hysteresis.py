@@ -5,6 +5,7 @@ import dataclasses
 from ..errors import ModelError
 from ..parameters import parameter
 from .base import CORE, Effect, require_oscillator
+from .fit_starts import positive
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,6 +20,8 @@ class Hysteresis(Effect):
     cause = "hysteresis"
     stage = CORE
     explanation = "The spring's force depends on its path, so that it takes another way back."
+    experiment = ("Drive one slow sine at several levels: output over acceleration is a loop, "
+                  "which stays open however slow.")
 
     strength: float = parameter("1")
     beta: float = parameter("1/(output units)", minimum=0)
@@ -35,3 +38,8 @@ class Hysteresis(Effect):
 
     def add_force(self, force):
         return dataclasses.replace(force, strength=self.strength, beta=self.beta, gamma=self.gamma)
+
+    @classmethod
+    def starts(cls, view):
+        return [positive(cls(0.02, beta / view.level, share * beta / view.level), "strength")
+                for beta in (0.3, 1.0, 3.0) for share in (-0.4, 0.4)]

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import CONDITIONER, Effect
+from .fit_starts import grid
 
 
 @dataclasses.dataclass(frozen=True)
@@ -15,6 +16,8 @@ class LowPassLag(Effect):
     cause = "low_pass_lag"
     stage = CONDITIONER
     explanation = "A first-order low-pass in the conditioner makes fast motion smaller and later."
+    experiment = ("Excite up to several times the corner frequency: a low-pass takes amplitude "
+                  "away there, a delay does not.")
 
     corner_hz: float = parameter("Hz", above=0)
 
@@ -24,3 +27,7 @@ class LowPassLag(Effect):
 
     def poles(self):
         return np.array([-2 * np.pi * self.corner_hz])
+
+    @classmethod
+    def starts(cls, view):
+        return grid([cls(corner) for corner in view.rate * np.geomspace(0.02, 20, 13)])

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import MOUNTING, Effect
+from .fit_starts import finite, grid, spectral_peaks
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,6 +21,8 @@ class MountingResonance(Effect):
     cause = "mounting_resonance"
     stage = MOUNTING
     explanation = "The mounting is a spring: it has a resonance of its own below the sensor."
+    experiment = ("Remount the sensor, or change the mounting's stiffness: a resonance of the "
+                  "mounting moves with it.")
 
     frequency_hz: float = parameter("Hz", above=0)
     damping_ratio: float = parameter("1", above=0, maximum=100)
@@ -34,3 +37,12 @@ class MountingResonance(Effect):
 
     def zeros(self):
         return np.array([-np.pi * self.frequency_hz / self.damping_ratio])
+
+    @classmethod
+    def starts(cls, view):
+        frequencies = view.rate * np.geomspace(0.02, 3.0, 18)
+        found = [start for ratio in (0.07, 0.2, 0.6)
+                 for start in grid([cls(frequency, ratio) for frequency in frequencies])]
+        # one that rings shows in the residual, between the points of any grid
+        return found + [finite(cls(peak, ratio)) for peak in spectral_peaks(view)
+                        for ratio in (0.02, 0.06)]

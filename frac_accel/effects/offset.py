@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import OFFSET, Effect
+from .fit_starts import free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -13,6 +14,8 @@ class Offset(Effect):
     cause = "offset"
     stage = OFFSET
     explanation = "A constant is added to the output."
+    experiment = ("Record at rest, and once more with the sensor turned over: an offset does not "
+                  "turn with it.")
 
     offset: float = parameter("output units")
 
@@ -21,3 +24,7 @@ class Offset(Effect):
 
     def invert(self, values, variance, circumstances):
         return values - self.offset, variance
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(0.01 * view.level), "offset")]

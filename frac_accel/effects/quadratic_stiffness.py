@@ -4,6 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import CORE, Effect, require_oscillator
+from .fit_starts import free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -13,6 +14,8 @@ class QuadraticStiffness(Effect):
     cause = "quadratic_stiffness"
     stage = CORE
     explanation = "The spring is harder in one direction than in the other."
+    experiment = ("Repeat at half and at twice the level: the deviation grows with the square of "
+                  "the level, with a second harmonic and a shift of the mean.")
 
     alpha2: float = parameter("1/(output units)")
 
@@ -21,3 +24,7 @@ class QuadraticStiffness(Effect):
 
     def add_force(self, force):
         return force.with_power(2, self.alpha2)
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(1e-3 / view.level), "alpha2")]

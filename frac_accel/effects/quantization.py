@@ -13,8 +13,10 @@ class Quantization(Effect):
     """Values are rounded to whole steps."""
 
     cause = "quantization"
+    read_off = True
     stage = QUANTIZATION
     explanation = "The output has a coarse resolution."
+    experiment = "Repeat at a tenth of the level: the steps between the values stay as large."
 
     step: float = parameter("output units", above=0)
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import GAIN, Effect
+from .fit_starts import finite, free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -15,6 +16,8 @@ class SensitivityError(Effect):
     cause = "sensitivity_error"
     stage = GAIN
     explanation = "The sensitivity differs from the model's by a constant ratio."
+    experiment = ("Compare with the reference at one frequency far below the resonance: a ratio "
+                  "of amplitudes other than 1 there is the sensitivity.")
 
     gain: float = parameter("1")
 
@@ -23,3 +26,7 @@ class SensitivityError(Effect):
 
     def reference_gain(self):
         return abs(self.gain)
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(1.01)), finite(cls(-1.0))]

@@ -7,6 +7,7 @@ import numpy as np
 from ..errors import FracAccelError
 from ..parameters import parameter
 from .base import GAIN, Effect
+from .fit_starts import free
 
 REFERENCE_C = 25.0
 # Standard deviation of a temperature that nobody tells: that of anything from -35 to 85 °C.
@@ -21,6 +22,8 @@ class TemperatureSensitivity(Effect):
     stage = GAIN
     explanation = "The sensitivity changes with temperature."
     needs_temperature = True
+    experiment = ("Run a temperature cycle at constant excitation, and record the temperature: "
+                  "the gain comes back with it, unlike a drift.")
 
     coefficient_per_k: float = parameter("1/K", minimum=-0.1, maximum=0.1)
 
@@ -44,3 +47,7 @@ class TemperatureSensitivity(Effect):
         excess = np.where(np.isnan(temperature_c), 0.0, temperature_c - REFERENCE_C)
         # beyond this the line has long ceased to hold
         return np.clip(1 + self.coefficient_per_k * excess, 0.1, 10.0)
+
+    @classmethod
+    def starts(cls, view):
+        return [free(cls(1e-4), "coefficient_per_k")] if view.warms else []

@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 
 from ..parameters import parameter
 from .base import INTERFERENCE, Effect
+from .fit_starts import finite, strongest_line
 
 # A tone that wanders by less than about a third of this share of its frequency is followed.
 _RELATIVE_WIDTH = 3e-4
@@ -19,6 +20,7 @@ class ToneInterference(Effect):
     cause = "tone_interference"
     stage = INTERFERENCE
     explanation = "A tone from elsewhere, such as mains hum, is added to the output."
+    experiment = "Record at rest: a tone from elsewhere is still there."
 
     frequency_hz: float = parameter("Hz", above=0)
     amplitude: float = parameter("output units", minimum=0)
@@ -77,3 +79,8 @@ class _Tracker:
         found = 2 * sums / weight * worth
         return (values - (found.real * tone.real - found.imag * tone.imag),
                 variance + worth * doubt / 2)
+
+    @classmethod
+    def starts(cls, view):
+        line = strongest_line(view)
+        return [finite(cls(*line))] if line else []

@@ -8,13 +8,18 @@ from scipy.signal import lfilter
 from ..core import Arx
 from ..errors import IdentificationError
 from .continuous_poles import METHOD, continuous_poles
-from .excitation import learning_length, persistent_excitation, strongest_stretch
+from .excitation import (
+    alternating_stretches,
+    highest_excited,
+    persistent_excitation,
+    strongest_stretch,
+)
 from .frequency_response import bulk_delay
 from .output_error import Fit
 from .uncertainty import sandwich
 
 MOST_POLES = 4
-MOST_ZEROS = 4
+MOST_ZEROS = 7
 # What is asked of the excitation: the poles of one oscillator and as many numerator coefficients.
 FEWEST_COEFFICIENTS = 4
 
@@ -22,12 +27,12 @@ FEWEST_COEFFICIENTS = 4
 _LONG_POLES = 16
 _LONG_INPUTS = 24
 _ITERATIONS = 60
-_SCAN_ITERATIONS = 8
+_SCAN_ITERATIONS = 2
 _TRIAL_ITERATIONS = 20
 # A step that gains this share of one sample's noise changes nothing that the data can tell; for the
 # choice of orders, which weighs gains of several samples' noise, less will do.
 _SMALL_GAIN = 1e-7
-_SMALL_GAIN_OF_TRIAL = 3e-2
+_SMALL_GAIN_OF_TRIAL = 0.1
 # The strongest stretch of a long record [samples] is enough to choose orders on.
 _CHOICE_LENGTH = 16384
 # Standard errors by which a larger model must predict held-out data better. What a model lacks is
@@ -36,6 +41,12 @@ _BETTER = 1.0
 # The same against a constant: below, chance alone finds one among all orders and delays.
 _RELATED = 5.0
 _BLOCKS = 32
+# Stretches of equal energy that are learnt from and held out in turn, for the choice of orders.
+_STRETCHES = 16
+# BIC above the best so far from which a model of that size is not fitted: odds of exp(10).
+_HOPELESS = 20.0
+# Time constants in a record, at least, of a pole above all excited frequencies.
+_SHORT = 30.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,7 +112,8 @@ class ArxFit(Fit):
                  for pair in self.continuous_equivalent()["poles"]]
         return [
             f"{orders.poles} pole(s) and {orders.inputs} numerator coefficient(s), chosen by BIC "
-            "and on held-out data; the uncertainties hold given these orders",
+            "and on held-out data, with one more than needed at either end of the numerator where "
+            "the excitation allows: their bias is small against the uncertainties",
             f"delay_s is {orders.delay} whole sample(s){stamps}, chosen and not estimated; a "
             "fraction of a sample that is the sensor's own is approximated by the numerator",
             f"the coefficients hold in z at {self.sampling_rate_hz:.6g} Hz only; in s the model "
@@ -163,12 +175,13 @@ def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=No
     -----
     Orders, where `start` does not give them, are chosen by BIC and on held-out data among up to
     `MOST_POLES` poles and `MOST_ZEROS` zeros, with no more coefficients than the excitation is
-    persistently exciting of.
+    persistently exciting of; the numerator is then given one more coefficient at either end, so
+    that what the choice cannot see is small against the uncertainties.
     """
     valid = np.ones(len(sensor), bool) if valid is None else valid
     if start is None:
         most = persistent_excitation(reference, sampling_rate_hz)[0]
-        part = strongest_stretch(reference, _CHOICE_LENGTH)
+        part = strongest_stretch(reference, _CHOICE_LENGTH, valid)
         start = _choose(reference[part], sensor[part], valid[part], most)
     orders, coefficients = start
     record = _Record(reference, sensor, valid, orders)
@@ -190,87 +203,109 @@ def least_squares(reference, sensor, orders):
 def _choose(reference, sensor, valid, most):
     """Orders and coefficients to start from.
 
-    All orders are fitted to the first part of the record. By growing number of coefficients, a
-    model replaces a smaller one only if its BIC is lower and it predicts the rest of the record
-    better by a standard error: BIC alone takes what a coloured residual pretends.
+    Models of all orders are fitted to every other stretch of the record. By growing number of
+    coefficients, a model replaces a smaller one only if its BIC is lower and it predicts the other
+    stretches better by a standard error: BIC alone takes what a coloured residual pretends.
     """
     if len(sensor) < 20 * (MOST_POLES + MOST_ZEROS):
         raise IdentificationError(f"the record has {len(sensor)} samples, expected at least "
                                   f"{20 * (MOST_POLES + MOST_ZEROS)} to choose orders on")
-    most = min(most, MOST_POLES + MOST_ZEROS + 1)
+    largest = min(most, MOST_POLES + MOST_ZEROS + 1)
     bulk = bulk_delay(reference, sensor)
     reach = min(_LONG_INPUTS, len(sensor) // 20)
     window = Orders(0, 0, bulk - reach), Orders(_LONG_POLES, 2 * reach, bulk - reach)
     record = _Record(reference, sensor, valid, *window)
-    learn = slice(int(np.clip(learning_length(record.reference), record.rows // 4,
-                              record.rows * 3 // 4)))
-    long = record.problem(window[1], learn)
+    record.hold_out(alternating_stretches(record.reference, _STRETCHES))
+    long = record.problem(window[1], record.learn)
     long_output = long.simulate(long.stable(long.least_squares()))[0]
 
-    inputs = min(MOST_ZEROS + 1, most - 1)
-    poles = min(MOST_POLES, most - inputs)
-    scanned = [_Trial.of(record, Orders(poles, inputs, delay), learn, long_output,
-                         _SCAN_ITERATIONS)
+    inputs = min(MOST_ZEROS + 1, largest - 1)
+    poles = min(MOST_POLES, largest - inputs)
+    scanned = [_Trial.of(record, Orders(poles, inputs, delay), long_output, _SCAN_ITERATIONS)
                for delay in range(bulk - reach, bulk + 3)]
     # the first coefficients may be nought: of the delays that do equally well, the longest
     enough = min(trial.bic for trial in scanned) + np.log(record.rows)
     earliest = max(trial.orders.delay for trial in scanned if trial.bic <= enough)
-    trials = [_Trial.of(record, Orders(poles, inputs, earliest + wait), learn, long_output)
-              for poles in range(1, MOST_POLES + 1)
-              for inputs in range(1, MOST_ZEROS + 2)
-              for wait in range(MOST_ZEROS + 2 - inputs)
-              if poles + inputs <= most]
-    constant = _Trial(Orders(0, 0, 0), np.zeros(0), np.inf, np.inf, record.centred())
+    return _widened(_best(_trials(record, long_output, earliest, largest), record), most)
+
+
+def _best(trials, record):
+    """Largest of the models that each improve on a smaller one."""
+    constant = _Trial(Orders(0, 0, 0), np.zeros(0), np.inf, np.inf, np.inf, record.centred())
     best = constant
     for trial in sorted(trials, key=lambda trial: (trial.orders.coefficients, trial.overall)):
         larger = trial.orders.coefficients > best.orders.coefficients
-        if larger and trial.bic < best.bic \
-                and _gain(trial.error, best.error, learn) > _BETTER:
+        if larger and trial.bic < best.bic and record.gain(trial.error, best.error) > _BETTER:
             best = trial
-    if best is constant or _gain(best.error, constant.error, learn) < _RELATED:
+    if best is constant or record.gain(best.error, constant.error) < _RELATED:
         raise IdentificationError(
-            f"no transfer function of up to {MOST_POLES} poles predicts the held-out end of the "
+            f"no transfer function of up to {MOST_POLES} poles predicts held-out stretches of the "
             "record better than a constant does: the sensor's output has nothing to do with the "
-            "reference, or its motion (a shock) ends before")
-    return best.orders, best.theta[:best.orders.coefficients]
+            "reference")
+    return best
+
+
+def _trials(record, long_output, earliest, most):
+    """Models of all orders that can be the best, from the largest to the smallest.
+
+    One is left out where even the residual of a larger model that contains it would give it a
+    hopeless BIC.
+    """
+    trials, least, best = [], {}, np.inf
+    for poles in range(MOST_POLES, 0, -1):
+        for inputs in range(min(MOST_ZEROS + 1, most - poles), 0, -1):
+            for wait in range(MOST_ZEROS + 2 - inputs):
+                larger = ((poles + 1, inputs, wait), (poles, inputs + 1, wait),
+                          (poles, inputs + 1, wait - 1))
+                cost = max(least.get(key, 0.0) for key in larger)
+                orders = Orders(poles, inputs, earliest + wait)
+                if record.bic(cost, orders) < best + _HOPELESS:
+                    trial = _Trial.of(record, orders, long_output)
+                    trials.append(trial)
+                    cost, best = max(cost, trial.cost), min(best, trial.bic)
+                least[poles, inputs, wait] = cost
+    return trials
+
+
+def _widened(trial, most):
+    """The chosen model's orders and coefficients, its numerator wider by one at either end.
+
+    A choice of orders tolerates a bias as large as the standard errors, so that intervals given
+    these orders cover too little. One step beyond the chosen the bias is small against them
+    ("undersmoothing": P. Hall, *Ann. Statist.* 20 (1992) 675-694). More poles would not do: where
+    they are too many, zeros cancel them and neither is determined.
+    """
+    orders, coefficients = trial.orders, trial.theta[:trial.orders.coefficients]
+    if orders.coefficients + 2 > most:
+        return orders, coefficients
+    a, b = np.split(coefficients, [orders.poles])
+    return Orders(orders.poles, orders.inputs + 2, orders.delay - 1), np.r_[a, 0, b, 0]
 
 
 @dataclasses.dataclass(frozen=True)
 class _Trial:
-    """A model fitted to the learning part, with its error over all rows.
+    """A model fitted to the learning rows, with its squared error there and its error everywhere.
 
     `overall` is its BIC with the log-likelihood of the rest added: between equally large models.
     """
 
     orders: Orders
     theta: np.ndarray
+    cost: float
     bic: float
     overall: float
     error: np.ndarray
 
     @classmethod
-    def of(cls, record, orders, learn, long_output, iterations=_TRIAL_ITERATIONS):
-        problem = record.problem(orders, learn)
+    def of(cls, record, orders, long_output, iterations=_TRIAL_ITERATIONS):
+        problem = record.problem(orders, record.learn)
         start = problem.instrumental(long_output)
         theta, cost = problem.search(start[:orders.coefficients], iterations,
                                      _SMALL_GAIN_OF_TRIAL)
-        count = problem.used.sum()
-        bic = count * np.log(cost / count) + (orders.coefficients + 1) * np.log(count)
-        whole = record.problem(orders)
-        error = np.where(whole.used, whole.sensor - whole.simulate(theta)[0], 0.0)
-        rest = whole.used[learn.stop:].sum()
-        overall = bic + rest * np.log(np.sum(error[learn.stop:]**2) / rest)
-        return cls(orders, theta, bic, overall, error)
-
-
-def _gain(error, other, learn):
-    """By how many standard errors `error` is smaller than `other` on the rows not learnt from."""
-    rest = slice(learn.stop, None)
-    energy = np.cumsum(other[rest]**2 + error[rest]**2)
-    # blocks of equal energy: the rest of a shock is a few strong samples and a long quiet
-    edges = np.unique(np.searchsorted(energy, np.arange(_BLOCKS) / _BLOCKS * energy[-1]))
-    blocks = np.add.reduceat((other**2 - error**2)[rest], edges)
-    return blocks.mean() / max(blocks.std(ddof=1) / np.sqrt(len(blocks)), 1e-300)
+        error = np.where(record.valid, record.sensor - problem.simulate(theta)[0], 0.0)
+        bic, rest = record.bic(cost, orders), error[record.rest]
+        overall = bic + len(rest) * np.log(max(rest @ rest, 1e-300) / len(rest))
+        return cls(orders, theta, cost, bic, overall, error)
 
 
 class _Record:
@@ -290,16 +325,36 @@ class _Record:
         self.level, self.mean = reference.mean(), sensor[kept][self.valid].mean()
         self.all = reference - self.level
         self.reference, self.sensor = self.all[kept], sensor[kept] - self.mean
+        self.highest = 2 * np.pi * highest_excited(reference)
 
-    def problem(self, orders, part=slice(None)):
+    def problem(self, orders, used=True):
         inputs = np.ones((orders.inputs + 1, self.rows))
         for i in range(orders.inputs):
             begin = self.first - orders.delay - i
             inputs[i] = self.all[begin:begin + self.rows]
-        return _Problem(orders.poles, inputs[:, part], self.sensor[part], self.valid[part])
+        return _Problem(orders.poles, inputs, self.sensor, self.valid & used, self.highest)
 
     def centred(self):
         return np.where(self.valid, self.sensor, 0.0)
+
+    def hold_out(self, rest):
+        """Take the rows of the mask `rest` for judging, the others for learning."""
+        self.rest, self.learn = self.valid & rest, self.valid & ~rest
+
+    def bic(self, cost, orders):
+        """Bayesian information criterion of a model with the squared error `cost` where learnt."""
+        count = self.learn.sum()
+        return (count * np.log(max(cost, 1e-300) / count)
+                + (orders.coefficients + 1) * np.log(count))
+
+    def gain(self, error, other):
+        """By how many standard errors `error` is smaller than `other` where not learnt."""
+        error, other = error[self.rest], other[self.rest]
+        energy = np.cumsum(other**2 + error**2)
+        # blocks of equal energy: a shock is a few strong samples and a long quiet
+        edges = np.unique(np.searchsorted(energy, np.arange(_BLOCKS) / _BLOCKS * energy[-1]))
+        blocks = np.add.reduceat(other**2 - error**2, edges)
+        return blocks.mean() / max(blocks.std(ddof=1) / np.sqrt(len(blocks)), 1e-300)
 
 
 class _Problem:
@@ -308,23 +363,28 @@ class _Problem:
     The initial values are the right-hand side's first rows: one for each pole.
     """
 
-    def __init__(self, poles, inputs, sensor, valid):
+    def __init__(self, poles, inputs, sensor, valid, highest):
         self.poles, self.inputs, self.sensor, self.used = poles, inputs, sensor, valid
+        self.highest = highest
         self.rows = len(sensor)
 
     def split(self, theta):
         return np.split(theta, [self.poles, self.poles + len(self.inputs)])
 
     def stable(self, theta):
-        """Coefficients with the poles that are not inside the unit circle reflected into it."""
+        """Coefficients with the poles that are not inside the unit circle reflected into it.
+
+        A pole above all excited frequencies must not ring on either: it would imitate noise by its
+        initial values alone. A slow one below them, as of AC coupling, shows in the phase above it.
+        """
         a, rest = theta[:self.poles], theta[self.poles:]
         poles = np.roots(np.r_[1, a])
         size = np.abs(poles)
-        if np.all(size < 1):
+        most = 1 - np.where(np.abs(np.angle(poles)) > self.highest, _SHORT, 1.0) / self.rows
+        inside = np.minimum(np.where(size < 1, size, 1 / np.maximum(size, 1)), most)
+        if np.all((size < 1) & (inside == size)):
             return theta
-        inside = np.minimum(1 / np.maximum(size, 1), 1 - 1 / self.rows)
-        poles = np.where(size < 1, poles, poles / np.maximum(size, 1) * inside)
-        return np.r_[np.poly(poles).real[1:], rest]
+        return np.r_[np.poly(poles / np.maximum(size, 1e-300) * inside).real[1:], rest]
 
     def simulate(self, theta):
         """Output without noise, and the denominator."""

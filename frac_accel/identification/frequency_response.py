@@ -2,9 +2,12 @@
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.signal import csd, welch
 
 _SEGMENTS = 4
 _MOST_BINS = 200
+# For a share of power: few frequencies, so that chance has little of it.
+_SHARE_SEGMENTS = 32
 
 
 def bulk_delay(reference, sensor):
@@ -57,3 +60,25 @@ def averaged_response(reference, sensor, sampling_rate_hz, delay):
         return np.add.reduceat(values[strong], edges)
     weight = gathered(power)
     return gathered(power * frequency) / weight, gathered(cross) / weight, weight
+
+
+def linear_share(reference, residual):
+    """Share of the residual's power that a linear model could still explain by the reference.
+
+    Parameters
+    ----------
+    reference, residual : ndarray, shape (n,)
+        Residual NaN where not known.
+
+    Returns
+    -------
+    float
+        Coherence averaged with the residual's power as weight; a few hundredths by chance.
+    """
+    known = np.nan_to_num(residual)
+    size = max(16, len(reference) // _SHARE_SEGMENTS)
+    power, left = (welch(values, nperseg=size)[1] for values in (reference, known))
+    shared = np.abs(csd(reference, known, nperseg=size)[1])**2
+    with np.errstate(invalid="ignore"):
+        explained = np.where(power > 1e-9 * power.max(), shared / power, 0.0)
+    return float(explained.sum() / max(left.sum(), 1e-300))

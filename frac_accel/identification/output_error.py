@@ -5,23 +5,34 @@ import dataclasses
 import numpy as np
 from scipy.fft import rfft
 
+from ..convolution import Convolution
 from ..errors import IdentificationError
-from ..simulation import Convolution
 from .excitation import strongest_stretch
 from .frequency_response import averaged_response, bulk_delay
 from .uncertainty import sandwich
 
 # Samples at both ends that the band-limited simulation cannot know, besides the unknown start.
 _EDGE = 32
-_ITERATIONS = 60
+_WAY = 64
+_ITERATIONS = 150
 # A step this small against the standard uncertainties changes nothing that the data can tell.
-_SMALL_STEP = 1e-3
-_IMPROVEMENTS = 25
-_SEARCHES = 2
+_SMALL_STEP = 1e-2
+_IMPROVEMENTS = 5
+# Steps after which a search that goes on is in a curved valley, and how far it looks ahead there.
+_STRAIGHT, _AHEAD = 8, 0.1
+# Damping of the search: enough to keep a singular system solvable, and what is as good as none.
+_LOWEST_DAMPING, _UNDAMPED, _HIGHEST_DAMPING = 1e-9, 1e-3, 1e6
 # Error of a start on the averaged response, over the best one's, with which it leads nowhere.
 _HOPELESS = 1.5
+# Share of its first amplitude at which a free motion counts for as much as all else that is known
+# of it: that it was not much larger than the output.
+_FAINT = 1e-3
+_OVER = -20.0
+# Energy, in variances of the noise, of a free motion that noise alone may show: the largest of a
+# spectrum of 1e5 lines has 23.
+_FEIGNED = 50.0
 _START_LENGTH = 16384
-_TRIAL_ITERATIONS = 4
+_TRIAL_ITERATIONS = 5
 # Share of the output's power, times the number of independent frequencies, that the best of all
 # resonances and delays still explains of an unrelated signal.
 _CHANCE = 10
@@ -65,7 +76,7 @@ class Fit:
 
 
 def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0,
-                     start=None):
+                     start=None, uncertainty=True):
     r"""Parameters of a structure, with sensitivity, delay and offset.
 
     Minimises the sum of the squared differences between the measured output and that simulated
@@ -91,6 +102,8 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
         Time by which the sensor's instants are later than the reference's.
     start : ndarray, optional
         `Fit.unknowns` of a fit of the same structure to start from, instead of the grid.
+    uncertainty : bool
+        Whether the covariance is wanted; NaN otherwise.
 
     Returns
     -------
@@ -101,12 +114,17 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
     IdentificationError
         If the best model explains no more than chance would.
     """
-    if start is None and len(sensor) > _START_LENGTH:
+    if start is None:
         # where the motion is strongest is enough to find out roughly where the parameters are
-        part = strongest_stretch(reference, _START_LENGTH)
-        start = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
-                         None if valid is None else valid[part], lag_s).solve(None).unknowns
-    return _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s).solve(start)
+        part = strongest_stretch(reference, _START_LENGTH, valid)
+        rough = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
+                         None if valid is None else valid[part], lag_s)
+        state = rough.solve(rough.starts())
+        if rough.n == len(sensor):
+            return rough.result(state, uncertainty)
+        start = state.theta
+    problem = _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s)
+    return problem.result(problem.solve([start]), uncertainty)
 
 
 class _Problem:
@@ -115,35 +133,39 @@ class _Problem:
     def __init__(self, structure, reference, sensor, rate, valid, lag_s):
         self.structure, self.rate, self.lag_s = structure, rate, lag_s
         self.n = len(sensor)
-        # the first value is taken as steady before the record: its response is a constant
-        self.level = reference[0]
-        self.convolution = Convolution(reference - self.level, rate, 2 * _EDGE / rate)
+        # the usual level is taken as steady before the record (its response is a constant), with
+        # a smooth way from there to the first value
+        self.level = np.median(reference)
+        way = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, _WAY, endpoint=False))
+        moving = np.r_[way * (reference[0] - self.level), reference - self.level]
+        self.convolution = Convolution(moving, rate, 2 * _EDGE / rate)
         self.prepared = structure.prepare(self.convolution.s)
-        self.time = np.arange(self.n) / rate
+        edge = min(_EDGE, self.n // 8)
         used = np.ones(self.n, bool) if valid is None else valid.copy()
-        used[:min(_EDGE, self.n // 8)] = False
-        used[-min(_EDGE, self.n // 8):] = False
+        used[:edge] = used[-edge:] = False
         self.used = used
-        self.all_used = slice(min(_EDGE, self.n // 8), self.n - min(_EDGE, self.n // 8)) \
-            if used.sum() == self.n - 2 * min(_EDGE, self.n // 8) else used
-        self.sensor = sensor[self.all_used]
+        self.judged = slice(edge, self.n - edge) if used.sum() == self.n - 2 * edge else used
+        self.sensor = sensor[self.judged]
+        self.instants = (np.arange(self.n) / rate)[self.judged]
         self.size = float(np.std(self.sensor))
-        self.reference = reference
-        self.whole = sensor
+        if self.size**2 == 0:
+            raise IdentificationError("the sensor's output is constant where it counts")
+        self.reference, self.whole = reference, sensor
+        low, high = structure.bounds(rate, self.n)
+        self.low, self.high = np.r_[low, -self.n / 4], np.r_[high, self.n / 4]
 
-    def solve(self, start):
-        starts = self.starts() if start is None else [start]
-        if self.structure.held and start is None:
-            trials = [self.search(theta, held=True) for theta in starts]
-            starts = [trial[1] for trial in sorted(trials, key=lambda trial: trial[0])[:_SEARCHES]]
-        best = None
-        for start in starts:
-            found = self.search(start)
-            if best is None or found[0] < best[0] * (1 - 1e-9):
-                best = found
-        cost, theta, linear, matrix = best
-        self.require_relation(1 - cost / (len(self.sensor) * self.size**2))
-        return self.result(theta, linear, matrix)
+    def solve(self, starts):
+        """State with the least cost that a search from one of the starts ends in."""
+        trials = [self.search(theta, _TRIAL_ITERATIONS if len(starts) > 1 else _ITERATIONS)
+                  for theta in starts]
+        trials.sort(key=lambda state: state.cost)
+        best, *others = (state if state.converged else self.search(state.theta, _ITERATIONS)
+                         for state in trials[:self.structure.searches])
+        for state in others:
+            if state.cost < best.cost * (1 - 1e-9):
+                best = state
+        self.require_relation(1 - best.cost / (len(self.sensor) * self.size**2))
+        return best
 
     def starts(self):
         """Most promising starting points: the grid's best, improved on the averaged response."""
@@ -153,7 +175,7 @@ class _Problem:
         prepared = self.structure.prepare(s)
         peak = frequency[np.argmax(np.abs(response))]
         grid = self.structure.grid(frequency[0], frequency[-1], peak)
-        models = np.stack([self.structure.gradient(prepared, point)[0] for point in grid])
+        models = self.structure.gradient(prepared, grid.T[:, :, None])[0]
         # the correlation may have peaked half a period of the resonance away from the delay
         energy = weight * np.abs(response)**2
         reach = 0.75 * self.rate * np.sum(energy) / np.sum(energy * frequency) + 2
@@ -162,145 +184,134 @@ class _Problem:
         turned = (weight * response)[:, None] * np.exp(np.outer(s, delays) / self.rate)
         shared = np.real(np.conj(models) @ turned)
         explained = shared**2 / (np.abs(models)**2 @ weight)[:, None]
-        held = [name in self.structure.held for name in self.structure.names]
+        held = np.array([name in self.structure.held for name in self.structure.names])
         best_delay = np.argmax(explained, axis=1)
         explained = np.max(explained, axis=1)
         chosen, seen = [], {}
+        # neighbours in frequency end in the same place; other dampings may not
+        kinds = np.c_[np.round(grid[:, 0], 1), np.round(grid[:, 1:], 3)].tolist()
+        groups = grid[:, held].tolist()
         for point in np.argsort(explained)[::-1]:
-            # neighbours in frequency end in the same place; other dampings may not
-            kind = *np.round(grid[point][1:], 3), round(grid[point][0], 1)
-            group = seen.setdefault(tuple(grid[point][held]), set())
+            kind = tuple(kinds[point])
+            group = seen.setdefault(tuple(groups[point]), set())
             if kind not in group and len(group) < self.structure.starting_points:
                 group.add(kind)
                 chosen.append(np.r_[grid[point], delays[best_delay[point]]])
-        improved = [self.improve(theta, s, prepared, response, np.sqrt(weight))
-                    for theta in chosen]
+        model = _AveragedResponse(self.structure, s, prepared, response, np.sqrt(weight), self)
+        costs, improved = model.improve(np.array(chosen))
         # half a period of the resonance, with the other polarity, looks much the same
-        best = min(improved, key=lambda pair: pair[0])[1]
-        half = np.r_[np.zeros(len(best) - 1), self.rate / (2 * peak)]
-        improved += [self.improve(theta, s, prepared, response, np.sqrt(weight))
-                     for theta in (best - half, best + half)]
-        improved.sort(key=lambda pair: pair[0])
+        half = np.r_[np.zeros(len(held)), self.rate / (2 * peak)]
+        best = improved[np.argmin(costs)]
+        further, others = model.improve(np.array([best - half, best + half]))
+        costs, improved = np.r_[costs, further], np.r_[improved, others]
         lag = bulk + self.lag_s * self.rate
-        best = {}
-        hopeless = _HOPELESS * improved[0][0]
-        for cost, theta in improved:
-            if cost > hopeless and not any(held):
+        starts = []
+        for place in np.argsort(costs):
+            if costs[place] > _HOPELESS * np.min(costs) and not held.any():
                 break
-            group = best.setdefault(tuple(theta[:-1][held]), [])
-            start = np.r_[theta[:-1], theta[-1] + lag]
-            known = any(np.max(np.abs(start - other)) < 0.05 for other in group)
-            if len(group) < self.structure.searches and not known:
-                group.append(start)
-        return [theta for group in best.values() for theta in group]
+            start = np.r_[improved[place][:-1], improved[place][-1] + lag]
+            if not any(np.max(np.abs(start - other)) < 0.05 for other in starts):
+                starts.append(start)
+        return starts[:self.structure.trials]
 
-    def improve(self, theta, s, prepared, response, weight):
-        """A few damped Gauss-Newton steps on the averaged response; (cost, unknowns).
+    def rows(self, theta):
+        """Simulated output, constant, free motions and derivatives by theta, one in each row.
 
-        What the structure keeps fixed here (a damping order) it finds in the time domain: the
-        window's leakage looks like damping, and would lead it astray.
+        Besides, their number without the derivatives, the free swing and its pole's derivatives.
         """
-        free = np.r_[[name not in self.structure.held for name in self.structure.names], True]
-        low, high = self.structure.bounds(self.rate, self.n)
-        low, high = np.r_[low, theta[-1] - 8], np.r_[high, theta[-1] + 8]
-        wanted = _real(weight * response)
-
-        def evaluate(theta):
-            model, slopes = self.structure.gradient(prepared, theta[:-1])
-            shift = weight * np.exp(-s * theta[-1] / self.rate)
-            parts = [model, *(part for part, kept in
-                              zip((*slopes, -s / self.rate * model), free) if kept)]
-            columns = np.stack([_real(part * shift) for part in parts], axis=1)
-            gain = columns[:, 0] @ wanted / (columns[:, 0] @ columns[:, 0])
-            error = wanted - gain * columns[:, 0]
-            return error @ error, columns * np.r_[1, np.full(free.sum(), gain)], error
-
-        cost, columns, error = evaluate(theta)
-        damping = 1e-3
-        for _ in range(_IMPROVEMENTS):
-            gram = columns.T @ columns
-            step = _solve(gram + damping * np.diag(np.diag(gram)), columns.T @ error)[1:]
-            trial = theta.copy()
-            trial[free] += np.clip(step, -0.7, 0.7)
-            trial = np.clip(trial, low, high)
-            new = evaluate(trial)
-            if new[0] < cost:
-                small = cost - new[0] < 1e-6 * cost
-                theta, (cost, columns, error), damping = trial, new, damping / 5
-                if small:
-                    break
-            else:
-                damping *= 10
-                if damping > 1e6:
-                    break
-        return cost, theta
-
-    def columns(self, theta):
-        """Matrix of (simulated output, constant, free motions, derivatives by theta)."""
         own, delay = theta[:-1], theta[-1] / self.rate - self.lag_s
         response, slopes = self.structure.gradient(self.prepared, own)
-        shift = np.exp(-self.convolution.s * delay)
-        response = response * shift
-        spectra = [response, *(slope * shift for slope in slopes),
-                   response * (-self.convolution.s / self.rate)]
-        simulated = [self.convolution.response(spectrum)[self.all_used] for spectrum in spectra]
-        free = [motion[self.all_used] for motion in self.structure.free_motions(own, self.time)]
-        # a free motion that is over before the first used sample is none
-        free = [motion for motion in free if np.max(np.abs(motion)) > 1e-9]
-        linear = [simulated[0], np.ones(len(self.sensor)), *free]
-        return np.stack(linear + simulated[1:], axis=1), len(linear)
+        spectra = np.array([response, *slopes, response * (-self.convolution.s / self.rate)])
+        spectra *= np.exp(-self.convolution.s * delay)
+        simulated = self.convolution.response(spectra)[:, _WAY:][:, self.judged]
+        # one that is over long before the first used sample is none
+        decays = [np.exp(-rate * self.instants)
+                  for rate in self.structure.decay_rates(own, self.instants[-1])
+                  if -rate * self.instants[0] > _OVER]
+        pole, pole_slopes = self.structure.mode(own)
+        rings = pole is not None and pole.real * self.instants[0] > _OVER
+        swing = np.exp(pole * self.instants) if rings else None
+        free = [swing.real, swing.imag, *decays] if rings else decays
+        rows = np.array([simulated[0], np.ones(len(self.sensor)), *free, *simulated[1:]])
+        return rows, 2 + len(free), swing, pole_slopes
 
-    def search(self, theta, held=False):
-        """Levenberg-Marquardt; (cost, theta, linear coefficients, last matrix).
-
-        With `held` a few steps only, in which what the structure holds back stays.
-        """
-        fixed = np.array([held and name in self.structure.held
-                          for name in (*self.structure.names, "delay_s")])
-        low, high = self.structure.bounds(self.rate, self.n)
-        low, high = np.r_[low, -self.n / 4], np.r_[high, self.n / 4]
-        theta = np.clip(theta, low, high)
-        damping, state = 0.0, self.evaluate(theta)
-        for _ in range(_TRIAL_ITERATIONS if held else _ITERATIONS):
-            cost, linear, matrix, count, gram, right = state
-            # derivatives by theta carry the sensitivity
-            scale = np.r_[np.ones(count), np.full(len(theta), linear[0])]
-            gram_scaled, right_scaled = gram * np.outer(scale, scale), right * scale
-            inner = gram_scaled[count:, count:] - gram_scaled[count:, :count] @ _solve(
-                gram_scaled[:count, :count], gram_scaled[:count, count:])
-            # the residual is orthogonal to the linear columns: only the slopes see it
-            slope = right_scaled[count:] - gram_scaled[count:, :count] @ linear
-            inner[fixed] = inner[:, fixed] = 0.0
-            slope[fixed] = 0.0
+    def search(self, theta, iterations):
+        """Levenberg-Marquardt from `theta`; the last state."""
+        state = self.state(np.clip(theta, self.low, self.high))
+        damping = _LOWEST_DAMPING
+        for iteration in range(iterations):
+            inner, slope = state.reduced()
             diagonal = np.diag(np.diag(inner))
+            enough = _SMALL_STEP**2 * state.cost / len(self.sensor)
             moved = False
-            for _ in range(12):
-                step = _solve(inner + damping * diagonal, slope)
-                trial = np.clip(theta + np.clip(step, -1, 1), low, high)
-                new = self.evaluate(trial)
-                if new[0] < cost:
+            while damping < _HIGHEST_DAMPING:
+                step = self.step(state.theta, inner + damping * diagonal, slope)
+                if damping < _UNDAMPED and slope @ step < enough:
+                    return dataclasses.replace(state, converged=True)
+                if iteration >= _STRAIGHT:
+                    step += self.bend(state, step, inner + damping * diagonal)
+                new = self.state(np.clip(state.theta + step, self.low, self.high))
+                if new.cost < state.cost:
                     moved = True
                     break
-                if abs(slope @ step) < 1e-12 * cost:
+                if abs(slope @ step) < 1e-12 * state.cost:
                     break
-                damping = max(4 * damping, 1e-3)
+                damping = max(8 * damping, 1e-4)
             if not moved:
-                break
-            gained = cost - new[0]
-            theta, state, damping = trial, new, damping / 10 if damping > 1e-9 else 0.0
-            # a gain this small against the noise, by an undamped step: nothing is left to find
-            if damping < 1e-3 and gained < _SMALL_STEP**2 * new[0] / len(self.sensor):
-                break
-        cost, linear, matrix = state[0], state[1], state[2]
-        return cost, theta, linear, matrix
+                return dataclasses.replace(state, converged=True)
+            state, damping = new, max(damping / 10, _LOWEST_DAMPING)
+        return state
 
-    def evaluate(self, theta):
-        matrix, count = self.columns(theta)
-        gram = matrix.T @ matrix
-        right = matrix.T @ self.sensor
-        linear = _solve(gram[:count, :count], right[:count])
-        residual = self.sensor - matrix[:, :count] @ linear
-        return float(residual @ residual), linear, matrix, count, gram, right
+    def step(self, theta, matrix, slope):
+        """Step within the bounds: what stands at one and is pushed outwards stays."""
+        free = np.ones(len(theta), bool)
+        while True:
+            step = np.zeros(len(theta))
+            step[free] = _solve(matrix[np.ix_(free, free)], slope[free])
+            step /= max(1, np.max(np.abs(step)))
+            outwards = np.where(step < 0, theta <= self.low, (theta >= self.high) & (step > 0))
+            stuck = free & outwards
+            if not stuck.any():
+                return step
+            free &= ~stuck
+
+    def bend(self, state, step, matrix):
+        """What the residual's curvature along a step adds to it; zero where it is no small part.
+
+        Geodesic acceleration for narrow curved valleys (M. Transtrum, J. Sethna,
+        arXiv:1201.5885).
+        """
+        ahead = self.state(np.clip(state.theta + _AHEAD * step, self.low, self.high))
+        count = len(state.linear)
+        slopes = state.linear[0] * state.rows[count:]
+        known = state.rows[:count]
+        gram = state.gram[:count, :count]
+        straight = step @ slopes
+        straight -= _solve(gram, known @ straight) @ known
+        curved = 2 / _AHEAD * ((ahead.residual - state.residual) / _AHEAD + straight)
+        curved -= _solve(gram, known @ curved) @ known
+        scale = np.sqrt(np.diag(matrix))
+        bend = np.where(step == 0, 0.0, 0.5 * _solve(matrix, slopes @ curved))
+        small = np.linalg.norm(scale * bend) < 0.75 * np.linalg.norm(scale * step)
+        return bend if small else np.zeros(len(step))
+
+    def state(self, theta):
+        rows, count, swing, pole_slopes = self.rows(theta)
+        known = rows[:count]
+        # what was over before the first used sample fades out of the fit instead of dropping out
+        faint = np.diag(np.r_[0.0, 0.0, np.full(count - 2, _FAINT**2)])
+        linear = _solve(known @ known.T + faint, known @ self.sensor)
+        residual = self.sensor - linear @ known
+        noise = residual @ residual / len(residual)
+        if swing is not None and np.sum((linear[2:4] @ known[2:4])**2) > _FEIGNED * noise:
+            # with the pole, what it left behind changes as well; what noise feigns of it does not
+            change = (linear[2] - 1j * linear[3]) / linear[0] * self.instants * swing
+            rows[count:-1] += np.outer(pole_slopes.real, change.real)
+            rows[count:-1] -= np.outer(pole_slopes.imag, change.imag)
+        gram, right = rows @ rows.T, rows @ self.sensor
+        gram[:count, :count] += faint
+        cost = residual @ residual + linear @ faint @ linear
+        return _State(theta, float(cost), linear, rows, residual, gram, right)
 
     def require_relation(self, explained):
         if explained < min(_CHANCE / self.independent(), 0.5):
@@ -311,32 +322,111 @@ class _Problem:
     def independent(self):
         """Number of independent frequencies that reference and sensor have in common."""
         full = np.zeros(self.n)
-        full[self.all_used] = self.sensor - self.sensor.mean()
+        full[self.judged] = self.sensor - self.sensor.mean()
         shared = np.abs(rfft(full))**2 * np.abs(rfft(self.reference - self.reference.mean()))**2
         return np.sum(shared)**2 / np.sum(shared**2)
 
-    def result(self, theta, linear, matrix):
-        count = len(linear)
-        jacobian = matrix.copy()
-        jacobian[:, count:] *= linear[0]
-        residual = self.sensor - matrix[:, :count] @ linear
+    def result(self, state, uncertainty=True):
+        """The fit in physical units; without `uncertainty` its covariance is NaN."""
+        theta, linear, count = state.theta, state.linear, len(state.linear)
         own, factors = self.structure.physical(theta[:-1])
-        jacobian[:, count:-1] = jacobian[:, count:-1] @ np.linalg.inv(factors)
-        jacobian[:, -1] *= self.rate
-        # sensitivity, structure, delay, offset, free motions
-        order = [0, *range(count, jacobian.shape[1]), *range(1, count)]
-        covariance = sandwich(jacobian[:, order], residual, self.used)
+        names = ("sensitivity", *self.structure.names, "delay_s", "offset")
+        covariance = np.full((len(names), len(names)), np.nan)
+        if uncertainty:
+            jacobian = state.rows.copy()
+            # the offset is what remains with the whole reference, not with the part that moves
+            jacobian[0] += self.level
+            jacobian[count:] *= linear[0]
+            jacobian[count:-1] = np.linalg.solve(factors.T, jacobian[count:-1])
+            jacobian[-1] *= self.rate
+            # sensitivity, structure, delay, offset, free motions
+            order = [0, *range(count, len(jacobian)), *range(1, count)]
+            covariance = sandwich(jacobian[order].T, state.residual, self.used)
+            covariance = covariance[:len(names), :len(names)]
         full = np.full(self.n, np.nan)
-        full[self.used] = residual
+        full[self.used] = state.residual
         offset = linear[1] - linear[0] * self.level
         values = np.r_[linear[0], own, theta[-1] / self.rate, offset]
-        names = ("sensitivity", *self.structure.names, "delay_s", "offset")
-        keep = len(names)
-        return Fit(names, values, covariance[:keep, :keep], full, theta)
+        return Fit(names, values, covariance, full, theta)
+
+
+@dataclasses.dataclass(frozen=True)
+class _State:
+    """A place in the search: rows as in `_Problem.rows`, the first of them with coefficients."""
+
+    theta: np.ndarray
+    cost: float
+    linear: np.ndarray
+    rows: np.ndarray
+    residual: np.ndarray
+    gram: np.ndarray
+    right: np.ndarray
+    converged: bool = False
+
+    def reduced(self):
+        """Normal matrix and slope of the unknowns, the linear coefficients eliminated."""
+        count, gain = len(self.linear), self.linear[0]
+        gram, across = self.gram, gain * self.gram[count:, :len(self.linear)]
+        inner = gain**2 * gram[count:, count:] - across @ _solve(gram[:count, :count], across.T)
+        # the residual is orthogonal to the linear rows: only the slopes see it
+        return inner, gain * self.right[count:] - across @ self.linear
+
+
+class _AveragedResponse:
+    """Fit to an averaged frequency response, of many starting points side by side."""
+
+    def __init__(self, structure, s, prepared, response, weight, problem):
+        self.structure, self.prepared, self.weight = structure, prepared, weight
+        self.shift = -s / problem.rate
+        self.wanted = _real(weight * response)
+        self.free = np.r_[[name not in structure.held for name in structure.names], True]
+        self.low, self.high = problem.low[:-1], problem.high[:-1]
+
+    def improve(self, theta):
+        """Damped Gauss-Newton steps from `theta`, shape (m, k + 1); costs and unknowns.
+
+        What the structure keeps fixed here (a damping order) it finds in the time domain: the
+        window's leakage looks like damping, and would lead it astray.
+        """
+        low = np.c_[np.tile(self.low, (len(theta), 1)), theta[:, -1] - 8]
+        high = np.c_[np.tile(self.high, (len(theta), 1)), theta[:, -1] + 8]
+        cost, gram, slope = self.evaluate(theta)
+        damping = np.full(len(theta), 1e-3)
+        for _ in range(_IMPROVEMENTS):
+            diagonal = np.einsum("mii->mi", gram)
+            damped = gram + np.eye(gram.shape[1]) * (
+                damping[:, None] * diagonal + 1e-12 * diagonal.max(axis=1)[:, None])[:, None]
+            step = np.linalg.solve(damped, slope[:, :, None])[:, 1:, 0]
+            trial = theta.copy()
+            trial[:, self.free] += np.clip(step, -0.7, 0.7)
+            trial = np.clip(trial, low, high)
+            new = self.evaluate(trial)
+            better = new[0] < cost
+            settled = np.all(np.where(better, cost - new[0] < 1e-3 * cost, damping > 1e3))
+            theta = np.where(better[:, None], trial, theta)
+            gram = np.where(better[:, None, None], new[1], gram)
+            slope = np.where(better[:, None], new[2], slope)
+            cost = np.where(better, new[0], cost)
+            damping = np.where(better, damping / 5, damping * 10)
+            if settled:
+                break
+        return cost, theta
+
+    def evaluate(self, theta):
+        """Costs (m,), normal matrices (m, p, p) and slopes (m, p) for the gain and what is free."""
+        model, slopes = self.structure.gradient(self.prepared, theta[:, :-1].T[:, :, None])
+        shift = self.weight * np.exp(self.shift * theta[:, -1:])
+        parts = [part for part, kept in zip((*slopes, self.shift * model), self.free) if kept]
+        rows = _real(np.stack([model, *parts], axis=1) * shift[:, None])
+        gain = rows[:, 0] @ self.wanted / np.einsum("mf,mf->m", rows[:, 0], rows[:, 0])
+        error = self.wanted - gain[:, None] * rows[:, 0]
+        rows[:, 1:] *= gain[:, None, None]
+        return (np.einsum("mf,mf->m", error, error), rows @ rows.transpose(0, 2, 1),
+                np.einsum("mpf,mf->mp", rows, error))
 
 
 def _real(values):
-    return np.r_[values.real, values.imag]
+    return np.concatenate([values.real, values.imag], axis=-1)
 
 
 def _solve(matrix, right):

@@ -24,9 +24,9 @@ def sandwich(jacobian, residual, used):
         Huge, not small, for what the data leave open.
     """
     scale = np.linalg.norm(jacobian, axis=0)
-    scaled = jacobian / scale
-    full = np.zeros((scaled.shape[1] + 1, len(used)))
-    full[:-1, used] = scaled.T
+    scaled = (jacobian / scale).T
+    full = np.zeros((len(scaled) + 1, len(used)))
+    full[:-1, used] = scaled
     full[-1, used] = residual
     length = next_fast_len(2 * len(used), real=True)
     spectra = rfft(full, length, axis=1)
@@ -37,9 +37,24 @@ def sandwich(jacobian, residual, used):
     twice[0] = 1.0
     if length % 2 == 0:
         twice[-1] = 1.0
-    columns = spectra[:-1]
-    meat = np.real((np.conj(columns) * (twice * smooth)) @ columns.T) / length
-    values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    bread = (vectors / np.maximum(values, 1e-15 * values[-1])) @ vectors.T
-    freedom = len(residual) / max(len(residual) - jacobian.shape[1], 1)
-    return freedom * bread @ meat @ bread / np.outer(scale, scale)
+    weighted = spectra[:-1] * np.sqrt(twice * smooth)
+    meat = np.real(np.conj(weighted) @ weighted.T) / length
+    values, vectors = np.linalg.eigh(scaled @ scaled.T)
+    bread = (vectors / np.maximum(values, 1e-14 * values[-1])) @ vectors.T
+    # as a square, so that rounding makes no variance negative
+    strengths, directions = np.linalg.eigh(meat)
+    root = bread @ (directions * np.sqrt(np.maximum(strengths, 0))) / scale[:, None]
+    freedom = len(residual) / max(len(residual) - len(scaled), 1)
+    return freedom * root @ root.T
+
+
+def white_noise(residual):
+    """White part of the residual: what is left above half the Nyquist frequency, spread evenly.
+
+    Below, the residual also holds what the model gets wrong, which is not noise.
+    """
+    clean = np.nan_to_num(residual)
+    power = np.abs(np.fft.rfft(clean * np.hanning(len(clean))))**2
+    window = np.sum(np.hanning(len(clean))**2)
+    # the median of a chi-squared of two degrees is ln 2 of its mean
+    return float(np.sqrt(np.median(power[len(power) // 2:]) / np.log(2) / window))

@@ -12,6 +12,8 @@ import numpy as np
 @numba.njit(cache=True)
 def along(z, dq, beta, gamma):
     """Bouc-Wen variable after q has moved by dq in one direction."""
+    if not (np.isfinite(dq) and np.isfinite(z)):  # the motion grows without bound
+        return np.nan
     direction = np.sign(dq)
     while dq != 0:
         side = direction if z == 0 else np.sign(z)

@@ -15,6 +15,9 @@ they are.
 The Bouc-Wen variable z is advanced exactly along the path of q (`bouc_wen`). Coulomb friction is
 the set-valued law (Filippov): at each reversal, found on the step's own polynomial, the mass
 sticks until the other forces exceed the Coulomb level.
+
+A stop is a further spring, :math:`\kappa` times as stiff, that acts on what q exceeds the stop's
+place by; a step is split where q comes to it or leaves it.
 """
 
 import dataclasses
@@ -41,7 +44,7 @@ class Motion:
 
 def integrate(acceleration, step_s, natural_frequency_hz, damping_ratio, damping_order=1.0,
               sensitivity=1.0, alpha2=0.0, alpha3=0.0, coulomb_level=0.0,
-              hysteresis=(0.0, 0.0, 0.0)):
+              hysteresis=(0.0, 0.0, 0.0), stop=(-np.inf, np.inf, 0.0)):
     """Integrate the equation at the top of this file.
 
     Parameters
@@ -52,6 +55,9 @@ def integrate(acceleration, step_s, natural_frequency_hz, damping_ratio, damping
         The grid's spacing [s].
     hysteresis : tuple of float
         Strength (lambda), beta and gamma.
+    stop : tuple of float
+        Places of the lower and the upper stop [output units], and their stiffness over the spring's
+        (kappa).
 
     Returns
     -------
@@ -64,7 +70,7 @@ def integrate(acceleration, step_s, natural_frequency_hz, damping_ratio, damping
         damping_order, 1 / (len(acceleration) * step_s), max(natural, 0.05 / step_s))
     physics = np.array([natural ** 2, 2 * damping_ratio * natural ** (2 - damping_order),
                         derivative.low, derivative.high, alpha2, alpha3, coulomb_level,
-                        *hysteresis])
+                        *hysteresis, *stop])
     force = sensitivity * np.ascontiguousarray(acceleration, dtype=float)
     q, v = _integrate(force, 2 * step_s, derivative.acts_on_velocity, derivative.rates,
                       derivative.weights, physics)
@@ -164,7 +170,8 @@ def _at(values, index):
 @numba.njit(cache=True)
 def _restoring(q, z, physics):
     """Restoring force over the stiffness, without its linear part and without friction."""
-    return q * q * (physics[4] + physics[5] * q) + physics[7] * z
+    beyond = min(q - physics[10], 0.0) + max(q - physics[11], 0.0)
+    return q * q * (physics[4] + physics[5] * q) + physics[7] * z + physics[12] * beyond
 
 
 @numba.njit(cache=True)
@@ -219,7 +226,7 @@ def _solve(length, state, phi, slip, force_middle, force_end, prepared, on_veloc
     known_end = (stiffness * (force_end - friction - q0 - length * v0)
                  - damping * end - matrix[1, 0] * u0)
     determinant = matrix[0, 1] * matrix[1, 2] - matrix[0, 2] * matrix[1, 1]
-    nonlinear = physics[4] != 0 or physics[5] != 0 or physics[7] != 0
+    nonlinear = physics[4] != 0 or physics[5] != 0 or physics[7] != 0 or physics[12] != 0
     c1, c2, zm, z1 = 0.0, 0.0, z0, z0
     for _ in range(FIXED_POINT_PASSES if nonlinear else 1):
         right_middle, right_end = known_middle, known_end
@@ -261,6 +268,22 @@ def _reversal(length, v0, u0, c1, c2, slip):
 
 
 @numba.njit(cache=True)
+def _contact(length, q0, v0, u0, c1, c2, place):
+    """Fraction of the step at which q passes the stop's place; above 1: nowhere."""
+    side = q0 - place
+    if (_displacement(1.0, length, q0, v0, u0, c1, c2) - place) * side >= 0:
+        return 2.0
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        x = (low + high) / 2
+        if (_displacement(x, length, q0, v0, u0, c1, c2) - place) * side < 0:
+            high = x
+        else:
+            low = x
+    return high if high > SHORTEST_SPLIT else 2.0  # where the step begins at the stop
+
+
+@numba.njit(cache=True)
 def _stuck_until(position, left, excess_force, index, grid, state, phi, rates, weights,
                  on_velocity, physics, step):
     """Fraction of the whole step at which the forces on the stuck mass overcome friction."""
@@ -285,6 +308,7 @@ def _integrate(grid, step, on_velocity, rates, weights, physics):
     phi = np.zeros(len(rates))
     whole = _prepare(step, on_velocity, rates, weights, physics)
     has_friction = physics[6] != 0
+    has_stop = physics[12] != 0
     mass = 1 + (physics[1] * physics[3] if on_velocity else 0.0)
     level = physics[0] * physics[6] / mass  # q'' that friction can hold or takes away
     slip = 0.0
@@ -322,6 +346,10 @@ def _integrate(grid, step, on_velocity, rates, weights, physics):
             share = 2.0
             if has_friction and split < MAX_SPLITS - 1:
                 share = _reversal(length, v0, u0, c1, c2, slip)
+            reversal = share
+            if has_stop and split < MAX_SPLITS - 1:
+                for place in physics[10:12]:
+                    share = min(share, _contact(length, q0, v0, u0, c1, c2, place))
             if share < 1:
                 length *= share
                 prepared = _prepare(length, on_velocity, rates, weights, physics)
@@ -344,11 +372,17 @@ def _integrate(grid, step, on_velocity, rates, weights, physics):
                 state = (q1, _velocity(1.0, length, v0, u0, c1, c2), u0 + c1 + c2, z1)
                 break
             position += left
-            drive = _drive(_at(grid, index + 2 * position), q1, 0.0, z1, phi, weights,
-                           on_velocity, physics)
-            slip = 0.0 if abs(drive) <= level else np.sign(drive)
-            state = (q1, 0.0, drive - level * slip if slip else 0.0, z1)
+            if share < reversal:
+                state = (q1, _velocity(1.0, length, v0, u0, c1, c2), u0 + c1 + c2, z1)
+            else:
+                drive = _drive(_at(grid, index + 2 * position), q1, 0.0, z1, phi, weights,
+                               on_velocity, physics)
+                slip = 0.0 if abs(drive) <= level else np.sign(drive)
+                state = (q1, 0.0, drive - level * slip if slip else 0.0, z1)
             if 1 - position < SHORTEST_SPLIT:
                 break
         q[index + 2], v[index + 2] = state[0], state[1]
+        if not np.isfinite(state[0]):
+            q[-1] = np.nan
+            break
     return q, v

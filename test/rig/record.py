@@ -128,7 +128,8 @@ def _core_output(core, effects, values, step_s):
             alpha2=effects.get("quadratic_stiffness", {"alpha2": 0.0})["alpha2"],
             alpha3=effects.get("cubic_stiffness", {"alpha3": 0.0})["alpha3"],
             coulomb_level=effects.get("coulomb_friction", {"level": 0.0})["level"],
-            hysteresis=(bouc_wen["strength"], bouc_wen["beta"], bouc_wen["gamma"])).q
+            hysteresis=(bouc_wen["strength"], bouc_wen["beta"], bouc_wen["gamma"]),
+            **_stop(effects)).q
     if core["type"] == "arx":
         points = 1 / (core["sampling_rate_hz"] * step_s)
         if not np.isclose(points, round(points), rtol=1e-9):
@@ -141,18 +142,36 @@ def _core_output(core, effects, values, step_s):
         list(zip(core["numerator_coefficients"], core["numerator_orders"])))
 
 
+def _stop(effects):
+    if "impact_stop" not in effects:
+        return {}
+    stop = effects["impact_stop"]
+    return {"stop": (stop.get("lower", -np.inf), stop.get("upper", np.inf), stop["stiffness"])}
+
+
 def _instants(effects, t):
     """Time at which the value stamped t was true."""
     skew_ppm = effects.get("clock_skew", {"skew_ppm": 0.0})["skew_ppm"]
-    return (t * (1 + 1e-6 * skew_ppm)
-            - effects.get("time_delay", {"delay_s": 0.0})["delay_s"])
+    instants = t * (1 + 1e-6 * skew_ppm) - effects.get("time_delay", {"delay_s": 0.0})["delay_s"]
+    if "moving_delay" in effects:
+        moving = effects["moving_delay"]
+        instants = instants - moving["amplitude_s"] * _sine(moving, t)
+    return instants
+
+
+def _sine(effect, t):
+    return np.sin(2 * np.pi * effect["frequency_hz"] * t + effect["phase_rad"])
 
 
 def _gain(effects, t, temperature_c):
     drift = effects.get("gain_drift", {"rate_per_s": 0.0})["rate_per_s"]
     thermal = effects.get("temperature_sensitivity", {"coefficient_per_k": 0.0})
-    return (effects.get("sensitivity_error", {"gain": 1.0})["gain"] * (1 + drift * t)
+    gain = (effects.get("sensitivity_error", {"gain": 1.0})["gain"] * (1 + drift * t)
             * (1 + thermal["coefficient_per_k"] * (temperature_c - 25)))
+    if "gain_modulation" in effects:
+        modulation = effects["gain_modulation"]
+        gain = gain * (1 + modulation["depth"] * _sine(modulation, t))
+    return gain
 
 
 def _cross_axis(by_axis):

@@ -22,6 +22,13 @@ CAUSES = (
     "timestamp_jitter", "dropped_samples",
 )
 
+# Physics that no cause of the package describes: a diagnosis may not give it one of the names
+# above. A sensor model cannot say it either, so `to_model` leaves it out.
+#   impact_stop      lower and/or upper [output units]: its place; stiffness: over the spring's
+#   gain_modulation  gain 1 + depth sin(2 pi frequency_hz t + phase_rad), t from the record's start
+#   moving_delay     delay amplitude_s sin(2 pi frequency_hz t + phase_rad)
+UNCATALOGUED = ("impact_stop", "gain_modulation", "moving_delay")
+
 
 @dataclasses.dataclass(frozen=True)
 class Sensor:
@@ -43,7 +50,7 @@ class Sensor:
 
     def __post_init__(self):
         for effects in (self.effects, *(a.get("effects", {}) for a in self.axes.values())):
-            unknown = set(effects) - set(CAUSES)
+            unknown = set(effects) - {*CAUSES, *UNCATALOGUED}
             if unknown:
                 raise ValueError(f"unknown causes {sorted(unknown)}")
 

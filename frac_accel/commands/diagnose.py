@@ -1,0 +1,92 @@
+"""Show what the simulation gets wrong, name the cause, extend the model, measure the gain."""
+
+import sys
+
+from ..bag import TEMPERATURE_TOPIC, read_temperature
+from ..diagnosis import diagnose
+from ..model import SensorModel
+from ._common import (
+    add_bag,
+    add_json,
+    add_report,
+    add_topics,
+    open_bag,
+    progress,
+    provenance,
+    require_output,
+    require_report,
+    step,
+    write_json,
+)
+
+
+def add_arguments(parser):
+    """Options of the verb."""
+    add_bag(parser)
+    parser.add_argument("--model", metavar="M.yaml",
+                        help="model in use (default: a classical one is identified first)")
+    add_topics(parser)
+    parser.add_argument("--temperature", default=TEMPERATURE_TOPIC, metavar="TOPIC",
+                        help="topic of the temperature, where there is one (default: %(default)s)")
+    parser.add_argument("--extended-model", metavar="E.yaml",
+                        help="write the model with what was found")
+    add_report(parser)
+    add_json(parser)
+
+
+def run(arguments):
+    """Do it."""
+    inputs = [arguments.bag, *filter(None, [arguments.model])]
+    if arguments.extended_model:
+        require_output(arguments.extended_model, *inputs)
+    require_report(arguments.report, *inputs)
+    model = SensorModel.load(arguments.model) if arguments.model else None
+    reader = open_bag(arguments.bag)
+    temperature = None
+    if arguments.temperature in reader.topics:
+        measured = read_temperature(arguments.bag, arguments.temperature)
+        temperature = measured.stamps_ns, measured.celsius
+    elif arguments.temperature != TEMPERATURE_TOPIC:
+        print(f"warning: {arguments.bag}: no topic {arguments.temperature}: what depends on "
+              "temperature cannot be found", file=sys.stderr)
+    with progress(None, unit="step") as bar:
+        found = diagnose(arguments.bag, model, arguments.axis, temperature, arguments.reference,
+                         arguments.sensor, lambda words: step(bar, words))
+    print(table(found, arguments.axis))
+    command = f"frac_accel diagnose {arguments.bag} --axis {arguments.axis}" + (
+        f" --model {arguments.model}" if arguments.model else "")
+    if arguments.extended_model and found.model is not None:
+        found.model.metadata["provenance"] = provenance(arguments.bag, command)
+        found.model.save(arguments.extended_model)
+        print(f"{arguments.extended_model}: written")
+    if arguments.report:
+        from ..report.diagnosis import diagnosis_page
+        diagnosis_page(found, provenance(arguments.bag, command)).write(arguments.report)
+        print(f"{arguments.report}: written")
+    write_json(arguments.json, found.as_dict(arguments.extended_model))
+
+
+def table(found, axis):
+    """The diagnosis as text."""
+    lines = [f"axis {axis}: {found.verdict}: {found.reason}"]
+    lines += [f"data: {words}" for words in found.integrity.words]
+    if found.verdict == "insufficient_data":
+        return "\n".join(lines)
+    if found.engine.problem.record.temperature_c is None:
+        lines.append("data: no temperature was recorded: what depends on it cannot be found")
+    lines.append(f"the model in use leaves {found.baseline['rmse']:.4g} "
+                 f"({found.baseline['nrmse']:.3%} of the output) on held-out data; noise "
+                 f"{found.baseline['noise_rms']:.4g}")
+    for finding in found.findings:
+        lines.append(f"{finding.cause}: {finding.effect.explanation}")
+        for name, entry in finding.as_dict()["parameters"].items():
+            lines.append(f"  {name:21} {entry['value']:12.6g} +- {entry['std']:.2g} "
+                         f"{entry['unit']}")
+        lines += [f"  {words}" for words in finding.evidence]
+    for suspect in found.suspects:
+        lines += [f"suspected: {' or '.join(suspect['causes'])}", f"  {suspect['experiment']}"]
+    if found.findings:
+        lines.append(f"the extended model leaves {found.extended['rmse']:.4g} "
+                     f"({found.extended['nrmse']:.3%}); {found.unexplained_fraction:.1%} of the "
+                     "excess error is unexplained")
+    return "\n".join(lines)

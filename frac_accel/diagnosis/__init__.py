@@ -1,0 +1,172 @@
+"""What a simulation gets wrong, which cause explains it, and what the extended model gains."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
+from ..core import Oscillator
+from ..effects import known_effects
+from ..errors import FracAccelError, IdentificationError
+from ..identification.excitation import learning_length
+from ..identification.record_checks import moving_samples
+from ..model import AXES, SensorModel
+from ..pair import Pair
+from . import integrity
+from .engine import Engine
+from .judgement import Diagnosis, Finding, Loose, insufficient, judge
+from .leftover import related
+from .record import Record
+
+__all__ = ["Diagnosis", "Finding", "diagnose"]
+
+_FEWEST = 512
+# Parameters of a classical core.
+_CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
+
+
+def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE_TOPIC,
+             sensor=RAW_TOPIC, progress=None):
+    """Find what a simulation gets wrong, and why.
+
+    Parameters
+    ----------
+    source : str, Path or tuple of Samples
+        A bag, or the samples of reference and sensor.
+    model : SensorModel, optional
+        The model in use; without it a classical one is identified first.
+    axis : {"x", "y", "z"}
+    temperature : tuple of ndarray, optional
+        Stamps [ns] and temperatures [°C].
+    reference, sensor : str
+        Topics, where `source` is a bag.
+    progress : callable, optional
+        Called with a few words before each step.
+
+    Returns
+    -------
+    Diagnosis
+
+    Raises
+    ------
+    FracAccelError
+        If the record cannot be used, or the sensor does not follow the reference.
+    """
+    progress = progress or (lambda words: None)
+    if isinstance(source, (str, Path)):
+        topics = read_bag(source, [reference, sensor])
+        source = topics[reference], topics[sensor]
+    column = AXES.index(axis)
+    progress("checking the data")
+    record = Record.of(*source, axis, temperature)
+    found = integrity.check(source[1], record.sampling_rate_hz, column)
+    if len(record) < _FEWEST:
+        return insufficient(f"the record has {len(record)} samples, expected at least {_FEWEST}",
+                            model, found)
+    moving, notes = moving_samples(record.reference[:, column], record.sensor[:, column], record)
+    found.words.extend(notes)
+    fixed, used = _limits(found, record, column)
+    used &= moving
+    split = learning_length(record.reference[:, column])
+    for rows, part in ((used[:split], "before"), (used[split:], "after")):
+        if rows.sum() < _FEWEST // 4:
+            return insufficient(f"{rows.sum()} samples count {part} the instant that parts "
+                                f"learning from judging, expected at least {_FEWEST // 4}",
+                                model, found)
+    seed = None
+    if model is None:
+        progress("identifying a classical model")
+        try:
+            model, loose, seed = _classical(record, axis, used)
+        except IdentificationError as error:
+            return insufficient(str(error), model, found)
+    else:
+        loose = _left_open(model, axis)
+    if found.jitter_rms_s:
+        # the common lag of the stamps is a median of scattered ones
+        std = 1.25 * found.jitter_rms_s / np.sqrt(found.samples)
+        known = loose.get("time_delay")
+        loose["time_delay"] = Loose(
+            known_effects()["time_delay"](model.axis(axis).delay_s),
+            {"delay_s": float(np.hypot(std, known.std["delay_s"] if known else 0.0))})
+    engine = Engine(record, column, model, used,
+                    {cause: entry.effect for cause, entry in loose.items()},
+                    [cause for cause, effect in known_effects().items()
+                     if not effect.read_off], progress)
+    _require_relation(engine, axis, seed)
+    return judge(engine, engine.run(seed), found, fixed, loose, source[1])
+
+
+def _limits(found, record, column):
+    """Clipping that the record shows, and the samples that are free of it."""
+    used = record.valid.copy()
+    if found.lower is None and found.upper is None:
+        return {}, used
+    measured = record.sensor[:, column]
+    beyond = 1e3 * float(np.max(np.abs(measured)))
+    limits = known_effects()["clipping"](-beyond if found.lower is None else found.lower,
+                                         beyond if found.upper is None else found.upper)
+    return {"clipping": limits}, used & (measured > limits.lower) & (measured < limits.upper)
+
+
+def _classical(record, axis, used):
+    """Classical core identified from the record, the causes that stay free because of it, and
+    those that it was identified with."""
+    from ..identification import identify
+    pair = Pair(record.sampling_rate_hz, record.reference, record.sensor, used, record.lag_s,
+                record.start_ns, float("nan"))
+    model = identify(pair, axis, "oscillator").model
+    return (SensorModel(model.core), _loose(model.core, dict.fromkeys(_CORE, np.inf)),
+            {effect.cause: effect for effect in model.effects})
+
+
+def _left_open(model, axis):
+    """Causes within the stated uncertainties of a model's core, delay and offset."""
+    own = model.axis(axis)
+    stated = model.metadata.get("uncertainties")
+    if not isinstance(stated, dict) or not isinstance(own.core, Oscillator) \
+            or own.core.damping_order != 1:
+        return {}
+    stds = {name: entry["std"] for name, entry in stated.items()
+            if isinstance(entry, dict) and isinstance(entry.get("std"), (int, float))
+            and np.isfinite(entry["std"]) and entry["std"] > 0}
+    effects = {effect.cause: effect for effect in own.effects}
+    if {"core_parameter_shift", "fractional_damping", "sensitivity_error"} & set(effects):
+        return {}
+    loose = _loose(own.core, stds)
+    for name, cause in (("delay_s", "time_delay"), ("offset", "offset")):
+        if name in stds:
+            loose[cause] = Loose(effects.get(cause, known_effects()[cause](0.0)),
+                                 {name: stds[name]})
+    return loose
+
+
+def _loose(core, stds):
+    """Core parameters that are free within their standard uncertainties."""
+    known, loose = known_effects(), {}
+    if {"natural_frequency_hz", "damping_ratio"} <= set(stds):
+        loose["core_parameter_shift"] = Loose(
+            known["core_parameter_shift"](core.natural_frequency_hz, core.damping_ratio),
+            {name: stds[name] for name in ("natural_frequency_hz", "damping_ratio")})
+    if "sensitivity" in stds:
+        loose["sensitivity_error"] = Loose(known["sensitivity_error"](1.0),
+                                           {"gain": stds["sensitivity"] / abs(core.sensitivity)})
+    return loose
+
+
+def _require_relation(engine, axis, seed):
+    """Refuse a sensor that does not follow the reference."""
+    p = engine.problem
+    start = p.simulate({**engine.search.base, **(seed or {})})
+    follows, share = related(p.measured, start, p.used)
+    if follows:
+        return
+    hint = ""
+    for other in range(3):
+        if other != p.axis and np.ptp(p.record.reference[:, other]):
+            simulated = p.simulator(other).simulate(p.baseline.axis(other))
+            elsewhere, more = related(p.measured, simulated, p.used)
+            if elsewhere and more > 2 * share:
+                hint = f"; it follows the reference's {AXES[other]}: the axes are exchanged"
+    raise FracAccelError(f"axis {axis}: the sensor does not follow the reference (they share "
+                         f"{max(share, 0):.2%} of the power); they do not belong together{hint}")

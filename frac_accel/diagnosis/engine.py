@@ -1,0 +1,194 @@
+"""Diagnosis of one axis: from a record and a model to named causes."""
+
+import numpy as np
+from scipy.fft import rfft
+from scipy.ndimage import uniform_filter1d
+
+from ..identification.excitation import (
+    alternating_stretches,
+    learning_length,
+    strongest_stretch,
+)
+from ..identification.uncertainty import sandwich
+from .gain import gain
+from .leftover import leftover
+from .problem import Problem
+from .search import Search
+
+# Improvement, in variances of one sample's noise and for each parameter, that chance does not give.
+_CHANCE = 30.0
+# Causes that compete for the place of each one found.
+_RIVALS = 4
+# Records of more samples are searched in part first.
+_LONG = 40_000
+# A last part with less than this of the motion before it proves little; stretches instead of it.
+_QUIET_END = 0.5
+_STRETCHES = 20
+# Parts of the record in which a cause's strength is compared.
+_PARTS = 5
+
+
+def noise_peak(residual, used):
+    """Largest density of a residual's smoothed spectrum, over its mean: 1 for white noise."""
+    power = np.abs(rfft(residual))**2
+    smooth = uniform_filter1d(power, max(5, len(power) // 64), mode="reflect")
+    return float(max(smooth.max() / smooth.mean(), 1.0))
+
+
+def held_out(reference):
+    """Which samples are held out, as a mask.
+
+    The last ones, from where a share of the reference's energy has come; where these are quiet, as
+    after a shock, every other stretch.
+    """
+    last = np.arange(len(reference)) >= learning_length(reference)
+    moving = reference - reference.mean()
+    if np.std(moving[last]) < _QUIET_END * np.std(moving[~last]):
+        return alternating_stretches(reference, _STRETCHES)
+    return last
+
+
+class Engine:
+    """Search, competition and judgement for one record."""
+
+    def __init__(self, record, axis, baseline, used, base=None, candidates=(), log=None):
+        self.problem = Problem(record, axis, baseline, used)
+        self._wanted = used
+        self.search = Search(self.problem, base, candidates, log)
+        self.held_out_rows = used & self.problem.used & held_out(record.reference[:, axis])
+        self._learnt = {}
+        # what the numerics of the simulation may still be wrong by
+        self.floor = 3e-5 * float(np.std(record.sensor[used, axis]))
+
+    def threshold(self, fitted):
+        """Cost by which a further parameter must improve on a fit."""
+        left = self.problem.count
+        variance = fitted.cost / left
+        return max(_CHANCE * variance * noise_peak(fitted.residual, self.problem.used),
+                   self.floor**2 * left)
+
+    def run(self, seed=None):
+        """The smallest set of causes that describes the record.
+
+        Parameters
+        ----------
+        seed : dict of str to Effect, optional
+            Causes to begin with.
+
+        Returns
+        -------
+        Fitted
+        """
+        p = self.problem
+        if len(p.record) > _LONG:
+            # where the motion is strongest is enough to find most causes
+            part = strongest_stretch(p.record.reference[:, p.axis], _LONG // 2)
+            found = Engine(p.record.part(part), p.axis, p.baseline, self._wanted[part],
+                           self.search.base, self.search.candidates, self.search.log).run(seed)
+            seed = {cause: effect for cause, effect in found.effects.items()
+                    if cause not in self.search.base}
+            return self.search.run(self.threshold, self.noise_only, seed, most=1)
+        return self.compete(self.search.run(self.threshold, self.noise_only, seed))
+
+    def score(self, fitted, variance):
+        """Cost with a penalty for each parameter, in units of the noise's variance."""
+        return fitted.cost / variance + _CHANCE * len(fitted.unknowns)
+
+    def compete(self, best):
+        """Let every cause's nearest rivals take its place; the winner of all."""
+        for _ in range(4):
+            for cause in best.effects:
+                if cause in self.search.base:
+                    continue
+                less = self.search.without(best, cause)
+                self.search.fit_all([{**less.effects, rival: begin} for _, rival, begin in
+                                     self.search.screen(less)[:_RIVALS] if rival != cause]
+                                    + [best.effects])
+            variance = best.cost / self.problem.count
+            winner = min((fit for fit in self.search.fits.values()
+                          if len(fit.effects) <= len(best.effects)),
+                         key=lambda fit: self.score(fit, variance))
+            if winner is best:
+                return best
+            best = winner
+        return best
+
+    def rivals(self, best, cause):
+        """Sets without a cause, no larger than the best, by score; (margin, causes)."""
+        variance = best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
+        own = self.score(best, variance)
+        found = [(self.score(fit, variance) - own, fit.causes) for fit in
+                 self.search.fits.values()
+                 if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
+        return sorted(found, key=lambda entry: entry[0])
+
+    def uncertainties(self, fitted):
+        """Standard uncertainties by cause and parameter, for any spectrum of the residual."""
+        if not fitted.unknowns:
+            return {}
+        jacobian, used = fitted.jacobian.copy(), self.problem.used
+        for i, unknown in enumerate(fitted.unknowns):
+            value = getattr(fitted.effects[unknown.cause], unknown.name)
+            jacobian[:, i] /= value if unknown.logarithmic else unknown.scale
+        stds = np.full(len(fitted.unknowns), np.inf)
+        # what does not change the output at all, the record leaves open
+        felt = np.linalg.norm(jacobian, axis=0) > 0
+        if felt.any():
+            covariance = sandwich(jacobian[np.ix_(used, felt)], fitted.residual[used], used)
+            stds[felt] = np.sqrt(np.maximum(np.diag(covariance), 0))
+        result = {}
+        for unknown, std in zip(fitted.unknowns, stds):
+            result.setdefault(unknown.cause, {})[unknown.name] = float(std)
+        return result
+
+    def learnt(self, fitted):
+        """The same causes, fitted to the learning part of the record only."""
+        if fitted.causes not in self._learnt:
+            part = self.problem.restricted(self.problem.used & ~self.held_out_rows)
+            self._learnt[fitted.causes] = part.fit(fitted.effects, iterations=6)
+        return self._learnt[fitted.causes]
+
+    def held_out(self, best, cause, step=None):
+        """Gain of a fitted cause on the part of the record that its fit has not seen.
+
+        With the `step` of a coarse lattice the simulated values are put on it too: what rounding
+        does to small signals is no other cause's merit.
+        """
+        errors = []
+        for fit in (self.search.without(best, cause), best):
+            simulated = self.learnt(fit).simulated
+            if step:
+                simulated = step * np.round(simulated / step)
+            errors.append((self.problem.measured - simulated)[self.held_out_rows])
+        return gain(*errors)
+
+    def unsteadiness(self, best, cause):
+        """Largest deviation from 1 of a cause's strength in parts of the record.
+
+        What a cause adds is scaled to the measured output in stretches of time and in classes of
+        the output's size, all with an equal share of it. A cause that only resembles the true one
+        is too strong in some and too weak in others.
+        """
+        p = self.problem
+        less = {name: effect for name, effect in best.effects.items() if name != cause}
+        added = p.clear(best.simulated - p.simulate(less), best.free)
+        energy, shared = added**2, added * (best.residual + added)
+        worst = 0.0
+        for order in (np.arange(len(added)), np.argsort(np.abs(best.simulated))):
+            total = np.cumsum(energy[order])
+            part = np.minimum((total / total[-1] * _PARTS).astype(int), _PARTS - 1)
+            strengths = (np.bincount(part, shared[order], _PARTS)
+                         / np.maximum(np.bincount(part, energy[order], _PARTS), 1e-300))
+            worst = max(worst, float(np.max(np.abs(strengths - 1))))
+        return worst
+
+    def noise_only(self, fitted):
+        """Whether a fit leaves nothing but noise."""
+        return self.left(fitted).share == 0
+
+    def left(self, fitted):
+        """What the residual still holds."""
+        p = self.problem
+        across = [signal for axis, signal in enumerate(p.record.reference.T)
+                  if axis != p.axis and np.ptp(signal)]
+        return leftover(fitted.residual, fitted.simulated, p.used, across)

@@ -1,0 +1,344 @@
+"""Fit of named causes to a record by simulation error."""
+
+import dataclasses
+
+import numpy as np
+
+from ..effects.base import CROSS_AXIS, GAIN, Effect
+from ..effects.time_delay import TimeDelay
+from ..errors import FracAccelError
+from ..model import AXES, AxisModel
+from ..parameters import parameter_fields
+from ..simulation import AxisSimulator
+
+# Samples at both ends that the band-limited simulation cannot know.
+_EDGE = 64
+_ITERATIONS = 12
+_STEP = 1e-3
+# A gain of this share of one sample's error changes nothing that the data can tell.
+_SMALL_GAIN = 1e-2
+
+
+@dataclasses.dataclass(frozen=True)
+class Fitted:
+    """Causes with the parameters that describe a record best.
+
+    Attributes
+    ----------
+    effects : dict of str to Effect
+    simulated : ndarray, shape (n,)
+        Output with them, free motion of the time before the record included.
+    residual : ndarray, shape (n,)
+        Measured less simulated [output units]; 0 where a sample does not count.
+    cost : float
+        Sum of the squares of the residual.
+    jacobian : ndarray, shape (n, p)
+        Derivatives of the output by the unknowns, clear of free motions.
+    unknowns : tuple of Unknown
+    theta : ndarray, shape (p,)
+    """
+
+    effects: dict
+    simulated: np.ndarray
+    residual: np.ndarray
+    cost: float
+    jacobian: np.ndarray
+    unknowns: tuple
+    theta: np.ndarray
+    free: np.ndarray
+
+    @property
+    def causes(self):
+        """Names of the causes."""
+        return frozenset(self.effects)
+
+
+@dataclasses.dataclass(frozen=True)
+class Unknown:
+    """One parameter of one cause, as the search sees it."""
+
+    cause: str
+    name: str
+    logarithmic: bool
+    scale: float
+    low: float
+    high: float
+
+
+class Problem:
+    """Simulation of one axis of a record with any set of causes, and its fit.
+
+    Parameters
+    ----------
+    record : Record
+    axis : int
+    baseline : SensorModel
+        The model in use.
+    used : ndarray of bool, shape (n,)
+        Samples that count.
+    """
+
+    def __init__(self, record, axis, baseline, used):
+        self.record, self.axis, self.baseline = record, axis, baseline
+        self.rate = record.sampling_rate_hz
+        self.time = np.arange(len(record)) / self.rate
+        self.measured = record.sensor[:, axis]
+        self.used = used.copy()
+        edge = min(_EDGE, len(record) // 16)
+        self.used[:edge] = self.used[-edge:] = False
+        self._simulators = {}
+        self._last = None, None
+        self.calls = 0
+
+    @property
+    def count(self):
+        """Number of samples that count."""
+        return int(self.used.sum())
+
+    def simulator(self, axis):
+        """Simulator of one axis."""
+        if axis not in self._simulators:
+            self._simulators[axis] = AxisSimulator(
+                self.record.reference[:, axis], self.rate, self.record.temperature_c)
+        return self._simulators[axis]
+
+    def axis_model(self, effects, axis=None):
+        """Model of an axis (default: the diagnosed one) with these causes."""
+        base = self.baseline.axis(self.axis if axis is None else axis)
+        kept = [effect for effect in base.effects if effect.cause not in effects]
+        return AxisModel(base.core, tuple(sorted([*kept, *effects.values()],
+                                                 key=lambda effect: effect.stage)))
+
+    def _on_stamps(self, model):
+        """The model of an axis with the sensor's stamps instead of the reference's."""
+        lag = self.record.lag_s
+        if not lag:
+            return model
+        others = tuple(e for e in model.effects if e.cause != "time_delay")
+        return AxisModel(model.core, (*others, TimeDelay(model.delay_s - lag)))
+
+    def simulate(self, effects):
+        """Output of the axis with these causes, shape (n,)."""
+        self.calls += 1
+        model = self._on_stamps(self.axis_model(effects))
+        simulator = self.simulator(self.axis)
+        values = simulator.respond(model)
+        for effect in model.effects:
+            values = values + self._across(effects, effect) if effect.stage == CROSS_AXIS \
+                else effect.simulate(values, simulator.circumstances)
+        return values
+
+    def _across(self, effects, cross):
+        """What the other axes add."""
+        total = np.zeros(len(self.record))
+        for other, name in enumerate(AXES):
+            share = getattr(cross, name)
+            if other == self.axis or not share or not np.ptp(self.record.reference[:, other]):
+                continue
+            model = self._on_stamps(self.axis_model(effects, other))
+            model = AxisModel(model.core, tuple(e for e in model.effects if e.stage < CROSS_AXIS))
+            total += share * self.simulator(other).simulate(model)
+        return total
+
+    def change(self, effects, cause, effect):
+        """First-order change of the output, shape (n,), when a cause is added or changed.
+
+        Forces of the spring act on the linear motion, and other causes as if there were no such
+        forces: cheap, and right for small ones.
+        """
+        linear = {name: other for name, other in effects.items()
+                  if not acts_on_spring(other) and name != cause}
+        model = self._on_stamps(self.axis_model(linear))
+        if acts_on_spring(effect):
+            added = self.force(model, effect)
+            if cause in effects:
+                added = added - self.force(model, effects[cause])
+            for later in model.effects:
+                # gains after the core act on what it adds as well; the rest is nearly the same
+                if later.stage == GAIN and later.cause != "sensitivity_error":
+                    added = later.simulate(added, self.simulator(self.axis).circumstances)
+            return added
+        before = {**linear, cause: effects[cause]} if cause in effects else linear
+        return self.simulate({**linear, cause: effect}) - self._remembered(before)
+
+    def force(self, model, effect):
+        """First-order response to a force."""
+        from .first_order import force_response
+        return force_response(self.simulator(self.axis), model, effect, self.rate)
+
+    def _remembered(self, effects):
+        """Output with these causes; the last one is kept."""
+        key = tuple(effects.items())
+        if self._last[0] != key:
+            self._last = key, self.simulate(effects)
+        return self._last[1]
+
+    def free_motions(self, effects):
+        """Orthonormal columns, shape (n, m): what the time before the record may have left."""
+        try:
+            poles = np.atleast_1d(self.axis_model(effects).poles())
+        except (FracAccelError, ArithmeticError):
+            poles = np.array([])
+        columns = []
+        core = self.axis_model(effects).effective_core
+        if getattr(core, "damping_order", 1.0) != 1.0:
+            rates = np.geomspace(2 / self.time[-1], 2 * np.pi * core.natural_frequency_hz, 4)
+            columns += [np.exp(-rate * self.time) for rate in rates]
+        for pole in poles:
+            if pole.imag < 0 or -pole.real * self.time[-1] < 1:
+                continue
+            decay = np.exp(np.maximum(pole.real * self.time, -60))
+            turn = pole.imag * self.time
+            columns += [decay] if pole.imag == 0 else [decay * np.cos(turn), decay * np.sin(turn)]
+        columns = [column * self.used for column in columns]
+        columns = [column for column in columns if np.max(np.abs(column)) > 1e-9]
+        if not columns:
+            return np.zeros((len(self.record), 0))
+        vectors, sizes, _ = np.linalg.svd(np.stack(columns, axis=1), full_matrices=False)
+        return vectors[:, sizes > 1e-6 * sizes[0]]
+
+    def clear(self, values, free):
+        """Values where they count, without the free motions; shape (n,) or (n, p)."""
+        masked = values * (self.used if values.ndim == 1 else self.used[:, None])
+        return masked - free @ (free.T @ masked)
+
+    def restricted(self, used):
+        """The same problem with fewer samples that count."""
+        part = object.__new__(type(self))
+        part.__dict__.update(self.__dict__, used=used)
+        return part
+
+    def fit(self, effects, iterations=_ITERATIONS):
+        """Parameters of these causes that describe the record best, found from those given.
+
+        Returns
+        -------
+        Fitted
+        """
+        unknowns = tuple(unknown for cause in effects
+                         for unknown in self.unknowns(effects[cause]))
+        theta = np.array([_to_theta(getattr(effects[u.cause], u.name), u) for u in unknowns])
+        effects, free = dict(effects), self.free_motions(effects)
+        simulated = self.simulate(effects)
+        residual = self.clear(self.measured - simulated, free)
+        cost, damping = float(residual @ residual), 0.0
+        jacobian = self.jacobian(effects, unknowns, theta, simulated, free)
+        for _ in range(iterations if unknowns else 0):
+            gram, slope = jacobian.T @ jacobian, jacobian.T @ residual
+            moved, last = False, cost
+            for _ in range(8):
+                step = _solve(gram + damping * np.diag(np.diag(gram)), slope)
+                trial = np.array([np.clip(value + np.clip(change, -1, 1), u.low, u.high)
+                                  for value, change, u in zip(theta, step, unknowns)])
+                try:
+                    new = self.replaced(effects, unknowns, trial)
+                    output = self.simulate(new)
+                except FracAccelError:
+                    output = None
+                if output is not None and np.isfinite(output).all():
+                    error = self.clear(self.measured - output, free)
+                    if error @ error < cost:
+                        moved = True
+                        break
+                damping = max(5 * damping, 1e-3)
+            if not moved:
+                break
+            theta, effects, simulated, residual = trial, new, output, error
+            cost = float(error @ error)
+            damping = damping / 10 if damping > 1e-6 else 0.0
+            done = last - cost < _SMALL_GAIN * cost / self.count
+            free = self.free_motions(effects)
+            residual = self.clear(self.measured - simulated, free)
+            cost = float(residual @ residual)
+            jacobian = self.jacobian(effects, unknowns, theta, simulated, free)
+            if done and damping < 1e-2:
+                break
+        return Fitted(effects, simulated, residual, cost, jacobian, unknowns, theta, free)
+
+    def jacobian(self, effects, unknowns, theta, simulated, free):
+        columns = np.zeros((len(self.record), len(unknowns)))
+        forced = any(map(acts_on_spring, effects.values()))
+        for i, unknown in enumerate(unknowns):
+            for step in (_STEP, -_STEP):
+                moved = theta.copy()
+                moved[i] = np.clip(theta[i] + step, unknown.low, unknown.high)
+                if moved[i] == theta[i]:
+                    continue
+                try:
+                    new = self.replaced(effects, unknowns, moved)
+                    if forced and not acts_on_spring(effects[unknown.cause]):
+                        change = self.change(effects, unknown.cause, new[unknown.cause])
+                    else:
+                        change = self.simulate(new) - simulated
+                except FracAccelError:
+                    continue
+                columns[:, i] = change / (moved[i] - theta[i])
+                break
+        return self.clear(columns, free)
+
+    def replaced(self, effects, unknowns, theta):
+        """Effects with the values of the unknowns."""
+        values = {}
+        for unknown, value in zip(unknowns, theta):
+            values.setdefault(unknown.cause, {})[unknown.name] = _from_theta(value, unknown)
+        return {cause: dataclasses.replace(effect, **values.get(cause, {}))
+                for cause, effect in effects.items()}
+
+    def unknowns(self, effect):
+        """Unknowns of one effect."""
+        result = []
+        for field in [] if effect.read_off else parameter_fields(type(effect)):
+            if effect.cause == "cross_axis_sensitivity":
+                other = AXES.index(field.name)
+                if other == self.axis or not np.ptp(self.record.reference[:, other]):
+                    continue
+            value, limits = getattr(effect, field.name), field.metadata
+            logarithmic = limits["above"] == 0 and limits["below"] is None
+            scale = self.scale(effect.cause, field.name, value)
+            lows = [limits[key] for key in ("above", "minimum") if limits[key] is not None]
+            highs = [limits[key] for key in ("below", "maximum") if limits[key] is not None]
+            low, high = max(lows, default=-np.inf), min(highs, default=np.inf)
+            if logarithmic:
+                least, most = self.reach(field.name, scale)
+                low, high = np.log(least), np.log(min(high, most))
+            else:
+                span = 1e-3 if np.isfinite(low) and np.isfinite(high) else 0
+                low, high = low / scale + span, high / scale - span
+            result.append(Unknown(effect.cause, field.name, logarithmic, scale, low, high))
+        return result
+
+    def reach(self, name, scale):
+        """Smallest and largest value of a positive parameter that a record could show."""
+        if name.endswith("_hz"):
+            return 1e-6 * self.rate, 1e3 * self.rate
+        if name == "damping_ratio":
+            return 1e-4, 100.0
+        return 1e-9 * scale, 1e9 * scale
+
+    def scale(self, cause, name, value):
+        """Change of a parameter that counts as one."""
+        level = float(np.std(self.measured[self.used]))
+        typical = {"delay_s": 1 / self.rate, "skew_ppm": 100.0, "offset": level,
+                   "rate_per_s": 1 / self.time[-1], "coefficient_per_k": 0.01,
+                   "alpha2": 0.1 / level, "alpha3": 0.1 / level**2, "gamma": 1 / level,
+                   "phase_rad": 1.0, "amplitude": level, "damping_order": 1.0, "gain": 1.0,
+                   "x": 1.0, "y": 1.0, "z": 1.0}
+        return typical.get(name, max(abs(value), 1e-12))
+
+
+def acts_on_spring(effect):
+    """Whether an effect changes the force of the core's spring."""
+    return type(effect).add_force is not Effect.add_force
+
+
+def _to_theta(value, unknown):
+    return np.log(value) if unknown.logarithmic else value / unknown.scale
+
+
+def _from_theta(value, unknown):
+    return float(np.exp(value)) if unknown.logarithmic else float(value * unknown.scale)
+
+
+def _solve(matrix, right):
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    return np.linalg.lstsq(matrix / np.outer(scale, scale), right / scale, rcond=1e-10)[0] / scale

@@ -1,0 +1,189 @@
+"""Competing causes: which smallest set describes the record."""
+
+import dataclasses
+
+import numpy as np
+
+from ..effects import known_effects
+from ..errors import FracAccelError
+
+_BEAM = 3
+# Factors within which a finite change can be had by a nearby start.
+_REACH = (0.6, 1.6)
+_FITS = 8
+_MOST = 4
+# Iterations of a first trial, and the cost over the best one's with which it ends there.
+_TRIAL = 4
+_HOPELESS = 4.0
+
+
+@dataclasses.dataclass(frozen=True)
+class View:
+    """What a cause sees of the search when it says where its fit begins."""
+
+    rate: float
+    time: np.ndarray
+    measured: np.ndarray
+    simulated: np.ndarray
+    residual: np.ndarray
+    used: np.ndarray
+    core: object
+    delay_s: float
+    level: float
+    warms: bool
+    excited: dict
+    axis: str
+
+
+class Search:
+    """Fits sets of causes, each once."""
+
+    def __init__(self, problem, base=None, candidates=(), log=None):
+        self.problem, self.base = problem, base or {}
+        self.candidates = candidates
+        self.fits = {}
+        self.screens = {}
+        self.log = log or (lambda words: None)
+
+    def fit(self, effects):
+        """Fitted set of causes, from the parameters given unless it is known."""
+        key = frozenset(effects)
+        if key not in self.fits:
+            self.fits[key] = self.problem.fit(effects)
+            self.log(f"fit {sorted(key - set(self.base))}: {self.fits[key].cost:.6g}")
+        return self.fits[key]
+
+    def fit_all(self, sets):
+        """Fitted sets by cost; those that fall far behind are not fitted to the end."""
+        trials = []
+        for effects in sets:
+            try:
+                trials.append((self.fits.get(frozenset(effects))
+                               or self.problem.fit(effects, _TRIAL), effects))
+            except FracAccelError:
+                continue  # a motion without bound describes no record
+        best = min((fit.cost for fit, _ in trials), default=0.0)
+        fits = []
+        for trial, effects in trials:
+            key = frozenset(effects)
+            if key not in self.fits:
+                self.fits[key] = self.problem.fit(trial.effects) \
+                    if trial.cost < _HOPELESS * best else trial
+                self.log(f"fit {sorted(key - set(self.base))}: {self.fits[key].cost:.6g}")
+            fits.append(self.fits[key])
+        return sorted(fits, key=lambda fit: fit.cost)
+
+    def view(self, fitted):
+        p = self.problem
+        model = p.axis_model(fitted.effects)
+        celsius = p.record.temperature_c
+        return View(p.rate, p.time, p.measured, fitted.simulated, fitted.residual, p.used,
+                    model.effective_core, model.delay_s,
+                    float(np.std(fitted.simulated[p.used])),
+                    celsius is not None and np.ptp(celsius) > 0.1,
+                    {name: bool(np.ptp(p.record.reference[:, i])) for i, name in enumerate("xyz")},
+                    "xyz"[p.axis])
+
+    def screen(self, fitted):
+        """List of (cost to be expected, cause, effect to begin with), best start of each cause."""
+        if fitted.causes in self.screens:
+            return self.screens[fitted.causes]
+        view, found = self.view(fitted), []
+        known = _orthonormal(fitted.jacobian)
+        for cause in self.candidates:
+            if cause in fitted.effects:
+                continue
+            options = [self._option(start, fitted, cause, known)
+                       for start in known_effects()[cause].starts(view)]
+            best = min((option for option in options if option), key=lambda option: option[0],
+                       default=None)
+            if best:
+                found.append(best)
+        self.screens[fitted.causes] = sorted(found, key=lambda entry: entry[0])
+        return self.screens[fitted.causes]
+
+    def _option(self, start, fitted, cause, known):
+        """(Cost to be expected, cause, effect to begin with) of one start, or None."""
+        p, changes = self.problem, []
+        for effect in start.columns:
+            try:
+                change = p.clear(p.change(fitted.effects, cause, effect), fitted.free)
+            except FracAccelError:
+                return None
+            changes.append(change - known @ (known.T @ change))
+        if len(changes) > 1:
+            basis = _orthonormal(np.stack(changes, axis=1))
+            explained = float(np.sum((basis.T @ fitted.residual)**2))
+            return fitted.cost - explained, cause, start.effect
+        size, shared = changes[0] @ changes[0], changes[0] @ fitted.residual
+        if size <= 1e-24 * fitted.cost:
+            return None
+        factor = shared / size
+        if start.kind == "positive" and factor <= 0:
+            return None
+        if start.kind == "weak" and factor <= 0:
+            return None
+        if start.kind in ("finite", "weak"):
+            factor = np.clip(factor, _REACH[0] if start.kind == "finite" else 0.0, _REACH[1])
+        cost = fitted.cost - 2 * factor * shared + factor**2 * size
+        effect = start.effect
+        if start.parameter:
+            scaled = factor * getattr(effect, start.parameter)
+            effect = dataclasses.replace(effect, **{start.parameter: float(scaled)})
+        return cost, cause, effect
+
+    def run(self, threshold, done, seed=None, most=_MOST):
+        """Grow sets of causes until nothing is gained; the best set of each size.
+
+        Parameters
+        ----------
+        threshold : callable
+            Cost by which a larger set must be better than a smaller fit.
+        done : callable
+            True for a fit that leaves nothing but noise.
+        seed : dict of str to Effect, optional
+            Causes to begin with, besides none.
+        most : int
+            Largest number of causes to be added.
+        """
+        beam = [self.fit(self.base)]
+        if seed:
+            beam = sorted([*beam, self.fit({**self.base, **seed})], key=lambda fit: fit.cost)
+        best = beam[0]
+        for _ in range(most):
+            wanted = {}
+            least = best.cost - threshold(best) if done(best) else np.inf
+            for parent in beam:
+                for cost, cause, begin in self.screen(parent):
+                    key = parent.causes | {cause}
+                    if parent.cost - cost > threshold(parent) and cost < least \
+                            and (key not in wanted or cost < wanted[key][0]):
+                        wanted[key] = cost, {**parent.effects, cause: begin}
+            chosen = sorted(wanted.values(), key=lambda entry: entry[0])[:_FITS]
+            fits = self.fit_all([effects for _, effects in chosen])
+            if not fits or best.cost - fits[0].cost < threshold(best):
+                break
+            best, beam = fits[0], fits[:_BEAM]
+        return self.prune(best, threshold)
+
+    def prune(self, best, threshold):
+        """Leave out causes without which the record is described as well."""
+        while True:
+            smaller = [self.without(best, cause)
+                       for cause in best.effects if cause not in self.base]
+            smaller = [fit for fit in smaller if fit.cost - best.cost < threshold(best)]
+            if not smaller:
+                return best
+            best = min(smaller, key=lambda fit: fit.cost)
+
+    def without(self, fitted, cause):
+        """The same set without one cause, fitted anew."""
+        return self.fit({name: effect for name, effect in fitted.effects.items() if name != cause})
+
+
+def _orthonormal(columns):
+    if not columns.shape[1]:
+        return columns
+    vectors, sizes, _ = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300),
+                                      full_matrices=False)
+    return vectors[:, sizes > 1e-6]

@@ -1,0 +1,93 @@
+"""Where the fit of a cause begins: what `Effect.starts` is made of."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.ndimage import uniform_filter1d
+
+
+class Start(NamedTuple):
+    """Where the fit of a cause may begin.
+
+    Attributes
+    ----------
+    effect : Effect
+    columns : tuple of Effect
+        Changes that are screened together, as if the output were linear in them.
+    kind : str
+        ``free``: the output is nearly linear in `parameter`, of either sign; ``positive``: the
+        same, but it cannot be negative; ``finite``: the effect counts as it is; ``weak``: as it is
+        or weaker.
+    parameter : str or None
+        What a screened factor scales.
+    """
+
+    effect: object
+    columns: tuple
+    kind: str
+    parameter: str | None = None
+
+
+def free(effect, parameter=None):
+    """Start of a cause that the output is nearly linear in."""
+    return Start(effect, (effect,), "free", parameter)
+
+
+def positive(effect, parameter=None):
+    """The same for a parameter that cannot be negative."""
+    return Start(effect, (effect,), "positive", parameter)
+
+
+def finite(effect):
+    """Start of a cause whose effect counts as it is."""
+    return Start(effect, (effect,), "finite")
+
+
+def grid(effects):
+    """Starts over a grid whose last effect is the weakest."""
+    *stronger, weakest = effects
+    return [*map(finite, stronger), Start(weakest, (weakest,), "weak")]
+
+
+def bulk_shift(simulated, measured, used):
+    """Whole samples by which the measured signal is later than the simulated."""
+    n = len(simulated)
+    length = next_fast_len(2 * n, real=True)
+    shared = irfft(np.conj(rfft((simulated - simulated[used].mean()) * used, length))
+                   * rfft((measured - measured[used].mean()) * used, length), length)
+    lags = np.r_[0:n // 4, -(n // 4):0]
+    return int(lags[np.argmax(shared[lags])])
+
+
+def spectral_peaks(view, count=3):
+    """Frequencies [Hz] of the highest peaks of the residual's smoothed spectrum."""
+    power = np.abs(rfft(view.residual))**2
+    width = max(3, len(power) // 400)
+    smooth = uniform_filter1d(power, width)
+    inner = smooth[1:-1]
+    tops = 1 + np.flatnonzero((inner > smooth[:-2]) & (inner >= smooth[2:]))
+    found = []
+    for top in tops[np.argsort(smooth[tops])[::-1]]:
+        if top > 2 * width and all(abs(top - other) > 2 * width for other in found):
+            found.append(top)
+        if len(found) == count:
+            break
+    return [top * view.rate / len(view.residual) for top in found]
+
+
+def strongest_line(view):
+    """Frequency [Hz], amplitude and phase [rad] of the residual's strongest line, or None."""
+    values = view.residual - view.residual[view.used].mean() * view.used
+    power = np.abs(rfft(values * np.hanning(len(values))))**2
+    power[:3] = 0
+    peak = int(np.argmax(power[:-1]))
+    if peak < 3:
+        return None
+    before, here, after = np.log(power[peak - 1:peak + 2] + 1e-300)
+    place = peak + 0.5 * (before - after) / (before - 2 * here + after)
+    frequency = place * view.rate / len(values)
+    wave = 2 * np.pi * frequency * view.time
+    basis = np.stack([np.sin(wave), np.cos(wave)], axis=1) * view.used[:, None]
+    sine, cosine = np.linalg.lstsq(basis, values, rcond=None)[0]
+    return float(frequency), float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))

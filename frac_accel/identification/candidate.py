@@ -1,0 +1,201 @@
+"""A structure fitted to a record, and judged on data that a second fit has not seen."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import FracAccelError, IdentificationError
+from ..metrics import octave_bands
+from ..model import AXES
+from ..pair import Pair
+from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
+from .direction import exchanged_instead, judge_direction
+from .excitation import learning_length, require_excitation
+from .fit_checks import far_apart, require_time_to_answer
+from .fit_validation import band_fits
+from .measured_response import MeasuredResponse
+from .output_error import Fit, fit_output_error
+from .prediction import predicted
+from .record_checks import RecordCheck, check_record
+from .structures import (
+    FractionalStructure,
+    FractionalTransferFunctionStructure,
+    OscillatorStructure,
+)
+
+# Fewest samples to learn from and to judge on.
+_FEWEST = 256
+# Residual from which on the two topics may belong together in another way.
+_POOR = 0.7
+# Likelihood ratio that two superfluous parameters reach in one of twenty records: chi-squared.
+_LIKELIHOOD_RATIO = 6.0
+STRUCTURES = {"arx": ArxStructure(), "oscillator": OscillatorStructure(),
+              "fractional": FractionalStructure(),
+              "fractional_transfer_function": FractionalTransferFunctionStructure()}
+
+
+@dataclasses.dataclass(frozen=True)
+class Data:
+    """One axis of a checked record, and its frequency response without a model."""
+
+    record: RecordCheck
+    pair: Pair
+    reference: np.ndarray
+    sensor: np.ndarray
+    spread: float
+    response: MeasuredResponse
+    progress: Callable
+
+    @classmethod
+    def of(cls, pair, axis, progress):
+        """Check a pair and measure its response."""
+        column = AXES.index(axis)
+        require_excitation(pair.reference[:, column], pair.sampling_rate_hz, FEWEST_COEFFICIENTS)
+        progress("checking the record")
+        record = check_record(pair, axis)
+        pair = record.pair
+        sensor = pair.sensor[:, column]
+        progress("measuring the frequency response")
+        return cls(record, pair, pair.reference[:, column], sensor,
+                   float(np.std(sensor[pair.valid])), MeasuredResponse.of(pair, axis), progress)
+
+    def fit(self, structure, part=slice(None), start=None, uncertainty=True):
+        """Fit of a structure to a part of the record."""
+        if start is None:
+            start = self.response.start(structure)
+        record = (self.reference[part], self.sensor[part], self.pair.sampling_rate_hz,
+                  self.pair.valid[part], self.pair.lag_s, start)
+        if isinstance(structure, ArxStructure):
+            return fit_arx(*record)
+        return fit_output_error(structure, *record, uncertainty)
+
+    def predicted(self, structure, fit, part):
+        """Prediction of a part of the record by the model of a fit, offset included."""
+        # over the whole record, so that the part begins with its true history
+        simulated = predicted(structure, fit, self.reference, self.pair.sampling_rate_hz,
+                              self.pair.lag_s)
+        return Prediction(self.sensor[part], simulated[part], self.pair.valid[part])
+
+
+@dataclasses.dataclass(frozen=True)
+class Prediction:
+    """Output of a part of a record, predicted by a model that has not seen it; or nothing."""
+
+    measured: np.ndarray
+    simulated: np.ndarray
+    valid: np.ndarray
+
+    @property
+    def nrmse(self):
+        """RMS of the error over the standard deviation of the output; NaN without either."""
+        error = (self.measured - self.simulated)[self.valid]
+        spread = np.std(self.measured[self.valid]) if len(error) else 0.0
+        # without its mean: motion long before the record still shows there as a constant
+        return float(np.std(error) / spread) if spread > 0 else float("nan")
+
+    def bands(self, rate, low, high):
+        """BandFits by octaves."""
+        if not np.isfinite(self.nrmse):
+            return []
+        # instants without a sample are predicted without error, so that they do not count
+        measured = np.where(self.valid, self.measured, self.simulated)
+        return band_fits(measured, self.simulated, rate, octave_bands(low, high))
+
+
+_NOTHING = Prediction(np.empty(0), np.empty(0), np.empty(0, bool))
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """A structure fitted to all data, and judged on data that a second fit has not seen.
+
+    Of several records `fits` holds each one's own, `fit` their mean.
+    """
+
+    structure: object
+    name: str
+    fit: Fit | ArxFit
+    fits: tuple
+    nrmse: float
+    held_out_nrmse: float
+    held_out: Prediction
+
+    @classmethod
+    def of(cls, name, data):
+        """Fit the structure of that name to one record."""
+        structure, fit = fitted(name, data)
+        data.progress(f"judging the {name} structure on held-out data")
+        held_out = _held_out(structure, fit, data)
+        return cls(structure, name, fit, (fit,), fit.rmse / data.spread, held_out.nrmse, held_out)
+
+
+def needed_order(structure):
+    """Parameters that the excitation must suffice for: also sensitivity and delay."""
+    return max(len(structure.names) + 2, FEWEST_COEFFICIENTS)
+
+
+def fitted(name, data):
+    """Structure of that name and its fit; or a simpler one's where the likelihoods hardly differ.
+
+    Raises
+    ------
+    IdentificationError
+        As `fit_of`.
+    """
+    structure = STRUCTURES[name]
+    data.progress(f"fitting the {name} structure")
+    fit = fit_of(structure, data)
+    simpler = None if isinstance(fit, ArxFit) else structure.simpler(fit.unknowns)
+    if simpler:
+        other = data.fit(simpler[0], start=simpler[1])
+        ratio = 2 * np.isfinite(fit.residual).sum() * np.log(other.rmse / fit.rmse)
+        if ratio < _LIKELIHOOD_RATIO:
+            return simpler[0], other
+    return structure, fit
+
+
+def fit_of(structure, data, start=None):
+    """Fit of a structure to all of a record.
+
+    Raises
+    ------
+    IdentificationError
+        If there is none; says if there is one of exchanged topics or with other stamps.
+    """
+    require_excitation(data.reference, data.pair.sampling_rate_hz, needed_order(structure))
+    try:
+        return data.fit(structure, start=start)
+    except IdentificationError as error:
+        record = data.reference, data.sensor, data.pair
+        raise exchanged_instead(*record) or far_apart(*record) or error from None
+
+
+def suspicions(fit, data):
+    """Notes on what is suspicious about a fit.
+
+    Raises
+    ------
+    IdentificationError
+        If no sensor can be behind it.
+    """
+    record = data.reference, data.sensor, data.pair
+    apart = far_apart(*record) if fit.rmse > _POOR * data.spread else None
+    if apart is not None:
+        raise apart
+    require_time_to_answer(fit, data.pair)
+    data.progress("judging the direction from reference to sensor")
+    return judge_direction(fit, *record)
+
+
+def _held_out(structure, fit, data):
+    """Prediction of the last part of the record by a model fitted to the rest alone."""
+    valid = data.pair.valid
+    split = learning_length(data.reference, valid)
+    if min(valid[:split].sum(), valid[split:].sum()) < _FEWEST:
+        return _NOTHING
+    try:
+        learnt = data.fit(structure, slice(split), start=fit.unknowns, uncertainty=False)
+        return data.predicted(structure, learnt, slice(split, None))
+    except FracAccelError:
+        return _NOTHING

@@ -1,0 +1,31 @@
+"""What an identified structure would have made of the reference."""
+
+from ..effects.offset import Offset
+from ..effects.time_delay import TimeDelay
+from ..model import SensorModel
+from ..simulation import simulate
+
+
+def predicted(structure, fit, reference, sampling_rate_hz, lag_s):
+    """Simulated output at the sensor's samples, which are `lag_s` later than the reference's.
+
+    Parameters
+    ----------
+    structure : OscillatorStructure, FractionalStructure or ArxStructure
+    fit : Fit
+    reference : ndarray, shape (n,)
+    sampling_rate_hz, lag_s : float
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    Raises
+    ------
+    FracAccelError
+        If no model can have these parameters.
+    """
+    # the pair's lag belongs to the stamps, not to the sensor
+    model = SensorModel(structure.core(fit), [TimeDelay(fit["delay_s"] - lag_s),
+                                              Offset(fit["offset"])])
+    return simulate(model, reference, sampling_rate_hz, axis="x", initial="steady")

@@ -1,0 +1,155 @@
+"""An identified model with everything that the data say about it."""
+
+import dataclasses
+
+import numpy as np
+
+from ..core import Oscillator
+from ..effects.offset import Offset
+from ..effects.time_delay import TimeDelay
+from ..model import SensorModel
+from ..parameters import parameter_fields, unit_of
+from .arx import ArxFit
+from .candidate import needed_order, suspicions
+from .excitation import Excitation
+from .fit_validation import FitValidation, fit_validation, judge_residual
+from .notes import candidate_notes
+from .points import ResponsePoints
+from .uncertainty import white_noise
+
+# Standard uncertainties from which on the model has an offset.
+_SIGNIFICANT = 3.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Identification:
+    """An identified model and what the data say about it.
+
+    What belongs to one record is, of several records, that of the first.
+
+    Attributes
+    ----------
+    model : SensorModel
+        Ready to be saved; its metadata hold uncertainties, covariance, band and rate.
+    structure, reason : str
+        Structure of the model, and why it was chosen.
+    parameters : dict of str to dict
+        ``value``, ``std`` and ``unit`` of each parameter.
+    nrmse : float
+        RMS of the residual over the standard deviation of the sensor's output; of several records
+        that of their common model, in quadratic mean.
+    held_out_nrmse : float
+        The same on the last part of the record with a model fitted to the rest of it alone; NaN
+        where that part holds no signal. Of several records: of each with the others' models.
+    notes : list of str
+        What a user must know before trusting the model.
+    validation : FitValidation
+        Residual tests, held-out data by octaves, agreement of the records, and the verdict.
+    residual : ndarray, shape (n,)
+        Measured less simulated [output units]; NaN where not judged.
+    excitation : Excitation
+        How the reference has excited the sensor, and how much of the record counts.
+    points : ResponsePoints or None
+        Frequency response of the pair without a model; None where the record gives none.
+    frequency_domain : dict or None
+        The same structure fitted to the points, and how far its parameters are from those above
+        (`compare_domains`); None for ARX and without points.
+    """
+
+    model: SensorModel
+    structure: str
+    reason: str
+    parameters: dict
+    nrmse: float
+    held_out_nrmse: float
+    notes: list
+    validation: FitValidation
+    residual: np.ndarray
+    excitation: Excitation
+    points: ResponsePoints | None
+    frequency_domain: dict | None
+
+    def as_dict(self):
+        """Plain numbers, lists and the model's content."""
+        return {"model": self.model.to_dict(), "structure": self.structure,
+                "reason": self.reason, "parameters": self.parameters,
+                "nrmse": self.nrmse, "held_out_nrmse": self.held_out_nrmse, "notes": self.notes,
+                "validation": self.validation.as_dict(),
+                "excitation": dataclasses.asdict(self.excitation),
+                "points": None if self.points is None else self.points.as_dict(),
+                "frequency_domain": self.frequency_domain}
+
+
+def identification(chosen, reason, datas, records, axis, provenance, agreeing=None):
+    """Identification from the chosen candidate.
+
+    Parameters
+    ----------
+    chosen : Candidate
+    reason : str
+    datas : list of Data
+    records : list of str
+        Their names.
+    axis : {"x", "y", "z"}
+    provenance : dict
+    agreeing : RecordAgreement, optional
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    IdentificationError
+        If no sensor can be behind the fit.
+    """
+    fit, data = chosen.fit, datas[0]
+    rate = data.pair.sampling_rate_hz
+    doubts = [(data.record.notes + suspicions(own, data)) for own, data in zip(chosen.fits, datas)]
+    excitation = Excitation.of(data.record, data.reference, data.sensor,
+                               needed_order(chosen.structure), data.response.excitation)
+    parameters = {name: {"value": float(value), "std": float(std), "unit": _unit(name)}
+                  for name, value, std in zip(fit.names, fit.values, fit.std)}
+    compared, more = data.response.compared(chosen.structure, chosen.fits[0])
+    notes = _named(doubts, records) + candidate_notes(parameters, chosen, data,
+                                                      excitation.band_hz)
+    notes += data.response.notes + more
+    own = chosen.fits[0]
+    tests = judge_residual(chosen.structure.core(own), own, data.reference, data.pair)
+    validation = fit_validation(tests, own.rmse / data.spread,
+                                chosen.held_out.bands(rate, *excitation.band_hz), agreeing)
+    effects = [TimeDelay(fit["delay_s"])]
+    if abs(fit["offset"]) > _SIGNIFICANT * parameters["offset"]["std"]:
+        effects.append(Offset(fit["offset"]))
+    model = SensorModel(chosen.structure.core(fit), effects, metadata={
+        "uncertainties": {name: {"std": entry["std"], "unit": entry["unit"]}
+                          for name, entry in parameters.items()},
+        "covariance": {"parameters": list(fit.names), "matrix": fit.covariance.tolist()},
+        "band_hz": list(excitation.band_hz),
+        "sampling_rate_hz": rate,
+        "noise_std": white_noise(fit.residual),
+        "provenance": {"axis": axis, "structure": chosen.name, "reason": reason, **provenance},
+        "validation": {"nrmse": chosen.nrmse, "held_out_nrmse": chosen.held_out_nrmse,
+                       "notes": notes, **validation.essentials()},
+        **({"continuous_equivalent": fit.continuous_equivalent()}
+           if isinstance(fit, ArxFit) else {}),
+    })
+    return Identification(model, chosen.name, reason, parameters, chosen.nrmse,
+                          chosen.held_out_nrmse, notes, validation, fit.residual, excitation,
+                          data.response.points, compared)
+
+
+def _named(notes, records):
+    """Each record's notes in one list, with its name where there are several."""
+    if len(notes) == 1:
+        return list(notes[0])
+    return [f"{name}: {note}" for name, own in zip(records, notes) for note in own]
+
+
+def _unit(name):
+    """Unit of a parameter, from the class that declares it."""
+    if name[1:].isdigit():
+        return {"a": "1", "b": unit_of(Oscillator, "sensitivity")}[name[0]]
+    # orders and ratios of the general equation belong to no class; they have no unit
+    return next((unit_of(cls, name) for cls in (Oscillator, TimeDelay, Offset)
+                 if name in (field.name for field in parameter_fields(cls))), "1")

@@ -1,0 +1,206 @@
+"""The page of a diagnosis: the verdict, its evidence, what was considered and what is left."""
+
+import numpy as np
+
+from ..model import AXES
+from ..parameters import parameter_fields
+from .diagnosis_figures import Compared, discrepancy
+from .figures import COVERAGE_FACTOR
+from .page import Page
+from .quantity import percent, rounded
+from .rivals import rivals
+from .signals import sentence
+
+_VERDICTS = {"consistent": "Consistent", "explained": "Explained",
+             "partly_explained": "Partly explained", "unexplained": "Unexplained",
+             "insufficient_data": "Insufficient data"}
+
+
+def diagnosis_page(found, provenance=None):
+    """Page of a diagnosis, whatever its verdict.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    provenance : dict, optional
+        As for `Page`.
+
+    Returns
+    -------
+    Page
+    """
+    problem = None if found.engine is None else found.engine.problem
+    axis = f", axis {AXES[problem.axis]}" if problem else ""
+    page = Page(f"Diagnosis{axis}: {_VERDICTS[found.verdict].lower()}", provenance)
+    _verdict(page.section("Verdict"), found)
+    if problem is None:
+        _data(page.section("Data"), found)
+        return page
+    compared = Compared.of(found)
+    discrepancy(page.section("What the simulation gets wrong"), compared, found)
+    if found.findings:
+        _causes(page.section("Causes"), found)
+    if found.suspects:
+        _suspects(page.section("Not told apart"), found)
+    rivals(page.section("What else was considered"), found)
+    _model(page.section("Extended model" if found.findings else "Model in use"), found, problem)
+    _left(page.section("What is left"), found, compared)
+    _data(page.section("Data"), found, problem)
+    return page
+
+
+def _verdict(section, found):
+    section.notice(f"{_VERDICTS[found.verdict]}: {found.reason}.")
+    if found.engine is None:
+        section.text("Nothing was fitted, and nothing is said about the sensor. Record what is "
+                     "missing, and diagnose again.")
+        return
+    before, after = found.baseline, found.extended
+    section.text(
+        f"On held-out data the model in use is wrong by {before['rmse']:.4g} output units (RMS), "
+        f"{percent(before['nrmse'])} of the output; {before['noise_rms']:.4g} may be noise.")
+    section.items(_short(finding) for finding in found.findings)
+    if found.findings:
+        section.text(
+            f"With {'this cause' if len(found.findings) == 1 else 'these causes'} the model is "
+            f"wrong by {after['rmse']:.4g} ({percent(after['nrmse'])} of the output) on the same "
+            f"data. {_unexplained(found)}")
+    for suspect in found.suspects:
+        section.text(f"Suspected, not named: {_listed(suspect['causes'])}.")
+
+
+def _short(finding):
+    """One cause in one line."""
+    values = []
+    for name, entry in finding.as_dict()["parameters"].items():
+        value, std = rounded(entry["value"], entry["std"])
+        spread = f" ± {std}" if std else ""
+        values.append(f"{name} {value}{spread} {_unit(entry)}".strip())
+    return (f"{finding.cause} ({', '.join(values)}). {finding.effect.explanation} Without it the "
+            f"held-out error is {finding.gain.before:.4g}, with it {finding.gain.after:.4g}: "
+            f"{finding.gain.reduction:.1%} less.")
+
+
+def _unexplained(found):
+    if not found.unexplained_fraction:
+        return "What is left does not differ from noise."
+    return (f"{percent(found.unexplained_fraction)} of the error's power above the noise stays "
+            "unexplained.")
+
+
+def _listed(causes):
+    return " or ".join(causes)
+
+
+def _unit(entry):
+    unit = entry["unit"].replace("^2", "²")
+    return "" if unit == "1" else unit
+
+
+def _causes(section, found):
+    parameters, gains = [], []
+    for finding in found.findings:
+        for name, entry in finding.as_dict()["parameters"].items():
+            value, std = entry["value"], entry["std"]
+            shown, uncertainty = rounded(value, std)
+            half = COVERAGE_FACTOR * std
+            interval = (f"{rounded(value - half, std)[0]} to {rounded(value + half, std)[0]}"
+                        if uncertainty else "–")
+            parameters.append([finding.cause, name, shown, uncertainty or "–", interval,
+                               entry["unit"].replace("^2", "²")])
+        g = finding.gain
+        gains.append([finding.cause, f"{g.before:.4g}", f"{g.after:.4g}", f"{g.reduction:.2%}",
+                      f"{g.ci95[0]:.2%} to {g.ci95[1]:.2%}", f"{finding.confidence:.3f}"])
+    for finding in found.findings:
+        section.text(f"{finding.cause}. {finding.effect.explanation}")
+        section.items([*map(sentence, finding.evidence),
+                       f"To confirm it: {finding.effect.experiment}"])
+        if finding.confusable_with:
+            section.text(f"Could be mistaken for {_listed(finding.confusable_with)}.")
+    section.table(["cause", "parameter", "value", "standard uncertainty",
+                   "95 % interval (k = 2)", "unit"], parameters,
+                  "Parameters. The uncertainties allow for a residual that is not white.")
+    section.table(["cause", "error without it", "error with it", "reduction",
+                   "95 % interval", "confidence"], gains,
+                  "Gain of each cause: RMS error [output units] on the part of the record that "
+                  "the fits have not seen, all other causes present in both. Intervals by a "
+                  "bootstrap over blocks. Confidence is against the best set without the cause.")
+
+
+def _suspects(section, found):
+    section.text("These would explain what was seen, but so would others, or too much is left "
+                 "unexplained to name them. They are not part of the extended model.")
+    section.table(["suspects", "margin", "experiment that tells"],
+                  [[_listed(suspect["causes"]), f"{suspect['margin']:.3g}", suspect["experiment"]]
+                   for suspect in found.suspects],
+                  "Margin: by how many variances of the noise the first choice is ahead of its "
+                  "nearest rival; 0 where too much is left for any margin to count.")
+
+
+def _model(section, found, problem):
+    axis = AXES[problem.axis]
+    before, after = problem.baseline.axis(axis), found.model.axis(axis)
+    own = {(f.cause, name): std for f in found.findings for name, std in f.std.items()}
+    old = {effect.cause: effect for effect in before.effects}
+    rows = _parameters(after.core.type, after.core, before.core, {})
+    for effect in after.effects:
+        rows += _parameters(effect.cause, effect, old.get(effect.cause), own)
+    if not found.findings:
+        rows = [[*row[:3], *row[5:]] for row in rows]
+        headers = ["part", "parameter", "value", "unit"]
+    else:
+        headers = ["part", "parameter", "in use", "extended", "standard uncertainty", "unit"]
+    section.table(headers, rows, "Parameters of the model of this axis. A part that acts on the "
+                  "core replaces the core's own parameters."
+                  if found.findings else "Parameters of the model of this axis.")
+
+
+def _parameters(part, entity, old, stds):
+    """Rows of the table of one core or effect; lists of coefficients are left out."""
+    rows = []
+    for field in parameter_fields(type(entity)):
+        if "unit" not in field.metadata:
+            continue
+        value = getattr(entity, field.name)
+        shown, std = rounded(value, stds.get((part, field.name), 0.0))
+        rows.append([part, field.name, "–" if old is None else f"{getattr(old, field.name):.6g}",
+                     shown, std or "–", field.metadata["unit"].replace("^2", "²")])
+    return rows
+
+
+def _left(section, found, compared):
+    section.text(_unexplained(found) if found.findings or found.verdict == "consistent" else
+                 "All of the error above the noise stays unexplained.")
+    left = found.engine.left(compared.fitted)
+    for share, score, words in (
+            (left.linear, left.linear_score, "still follows the motion as a linear system would"),
+            (left.level, left.level_score, "comes and goes with the size of the motion")):
+        section.text(f"Share of the residual's power that {words}: {percent(max(share, 0.0))} "
+                     f"({score:.1f} standard deviations from what chance gives).")
+    if left.share:
+        section.text("Noise does neither. Six standard deviations count as significant.")
+
+
+def _data(section, found, problem=None):
+    seen = found.integrity
+    section.items(map(sentence, seen.words))
+    if not seen.words:
+        section.text("Stamps and values show nothing unusual: no samples are missing, repeated or "
+                     "not finite, no limit is reached.")
+    if problem is None:
+        section.text(f"{seen.samples} samples of the sensor.")
+        return
+    record, rows = problem.record, found.engine.held_out_rows
+    parts = int(np.sum(np.diff(rows.astype(int)) > 0))
+    section.text(f"{len(record)} samples at {record.sampling_rate_hz:.6g} Hz "
+                 f"({len(record) / record.sampling_rate_hz:.4g} s), of which "
+                 f"{int(record.valid.sum())} in both topics and {problem.count} used. Held-out "
+                 f"errors are of {rows.mean():.0%} of the record, "
+                 + ("its last part, by fits to what comes before." if parts <= 1 else
+                    f"{parts} stretches of it, by fits to the stretches between."))
+    sought = "was recorded and is accounted for" if record.temperature_c is not None else \
+        "was not recorded: what depends on it cannot be found"
+    section.text(f"The temperature {sought}.")
+    if not np.ptp(np.delete(record.reference, problem.axis, axis=1), axis=0).any():
+        section.text("The reference shows no motion across the axis: cross-axis sensitivity "
+                     "cannot be found.")

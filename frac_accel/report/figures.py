@@ -1,0 +1,382 @@
+"""Figures of the reports. Each function gives a plotly figure for `Section.figure`.
+
+Colours are chosen to be read on white and on dark paper; the page sets those of axes and text.
+Signals of any length are thinned to their envelope, so that a page stays small.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from .page import require_plotly
+
+MEASURED = "#8a919a"
+MODEL = "#2f86c9"
+RESIDUAL = "#d9772b"
+SERIES = (MODEL, RESIDUAL, "#3d9c63", "#9467bd", MEASURED, "#c2498a")
+
+# Points of a signal after `envelope`: more than a screen has columns, twice.
+MOST_POINTS = 4000
+_FONT = "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif"
+# Half-width of a 95 % interval in standard uncertainties, as calibration certificates have it.
+COVERAGE_FACTOR = 2.0
+
+
+@dataclasses.dataclass(frozen=True)
+class ResponseCurve:
+    """A frequency response with its 95 % interval.
+
+    Attributes
+    ----------
+    frequency_hz : ndarray, shape (m,)
+    response : ndarray of complex, shape (m,)
+    amplitude_interval : tuple of two ndarray, shape (m,), or None
+        Limits relative to the amplitude: -0.01 and 0.01 for one percent.
+    phase_interval_rad : tuple of two ndarray, shape (m,), or None
+        Limits as differences from the phase.
+    """
+
+    frequency_hz: np.ndarray
+    response: np.ndarray
+    amplitude_interval: tuple | None = None
+    phase_interval_rad: tuple | None = None
+
+
+def bode(curve, points=None, modelled=None, unit="output units per m/s²"):
+    """Amplitude and phase over frequency.
+
+    Parameters
+    ----------
+    curve : ResponseCurve
+    points : ResponsePoints, optional
+    modelled : ndarray of complex, shape (k,)
+        The model's response at the frequencies of the points.
+    unit : str
+        Of the amplitude.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    figure = _rows(2, 560, "frequency [Hz]", [f"amplitude [{unit}]", "phase [°]"],
+                   weights=(0.6, 0.4), x_type="log")
+    amplitude, phase = np.abs(curve.response), np.unwrap(np.angle(curve.response))
+    frequency = curve.frequency_hz
+    if curve.amplitude_interval is not None:
+        low, high = curve.amplitude_interval
+        _band(figure, frequency, amplitude * (1 + low), amplitude * (1 + high), 1)
+        low, high = curve.phase_interval_rad
+        _band(figure, frequency, np.degrees(phase + low), np.degrees(phase + high), 2,
+              legend=False)
+    if points is not None:
+        ratio = points.response / modelled
+        # on the model's branch, so that no point lies a turn away
+        own = np.interp(points.frequency_hz, frequency, phase) + np.angle(ratio)
+        size = np.abs(points.response)
+        _points(figure, points.frequency_hz, size, 1, size * points.std_amplitude)
+        _points(figure, points.frequency_hz, np.degrees(own), 2, np.degrees(points.std_phase_rad),
+                legend=False)
+    _line(figure, frequency, amplitude, 1, "model", MODEL)
+    _line(figure, frequency, np.degrees(phase), 2, "model", MODEL, legend=False)
+    figure.update_yaxes(type="log", row=1, col=1)
+    return figure
+
+
+def response_deviation(curve, points, modelled):
+    """How far the measured points are from the model, with the intervals of both.
+
+    Parameters
+    ----------
+    curve : ResponseCurve
+    points : ResponsePoints
+    modelled : ndarray of complex, shape (k,)
+        The model's response at the frequencies of the points.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    figure = _rows(2, 520, "frequency [Hz]", ["amplitude [%]", "phase [°]"], x_type="log")
+    ratio = points.response / modelled
+    spreads = 100 * np.abs(ratio) * points.std_amplitude, np.degrees(points.std_phase_rad)
+    if curve.amplitude_interval is not None:
+        _band(figure, curve.frequency_hz, *(100 * limit for limit in curve.amplitude_interval), 1)
+        _band(figure, curve.frequency_hz, *map(np.degrees, curve.phase_interval_rad), 2,
+              legend=False)
+    zero = np.zeros(2)
+    ends = curve.frequency_hz[[0, -1]]
+    shown = 100 * (np.abs(ratio) - 1), np.degrees(np.angle(ratio))
+    for row, (values, spread) in enumerate(zip(shown, spreads), 1):
+        _points(figure, points.frequency_hz, values, row, spread, legend=row == 1)
+        _line(figure, ends, zero, row, "model", MODEL, legend=row == 1)
+        _focus(figure, values, row)
+    return figure
+
+
+def response_interval(curve):
+    """Half-widths of the interval of a response: what a calibration certificate states.
+
+    Parameters
+    ----------
+    curve : ResponseCurve
+        With its intervals.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    figure = _rows(2, 420, "frequency [Hz]", ["amplitude [± %]", "phase [± °]"], x_type="log")
+    low, high = curve.amplitude_interval
+    _line(figure, curve.frequency_hz, 50 * (high - low), 1, "amplitude", MODEL, legend=False)
+    low, high = curve.phase_interval_rad
+    _line(figure, curve.frequency_hz, np.degrees(high - low) / 2, 2, "phase", MODEL, legend=False)
+    figure.update_yaxes(rangemode="tozero")
+    return figure
+
+
+def mark_band(figure, band_hz):
+    """Mark the ends of a frequency band in a figure over frequency.
+
+    Parameters
+    ----------
+    figure : plotly.graph_objects.Figure
+    band_hz : sequence of two float
+        An end at zero is not marked: no logarithmic axis has it.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+        The same.
+    """
+    for end in band_hz:
+        if end > 0:
+            figure.add_shape(type="line", x0=end, x1=end, xref="x", y0=0, y1=1, yref="paper",
+                             line={"color": MEASURED, "width": 1, "dash": "dash"})
+    return figure
+
+
+def time_signals(time_s, signals, residual=None, unit="output units"):
+    """Signals over time, and below them what is left.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,)
+    signals : dict of str to ndarray, shape (n,)
+        NaN leaves a gap.
+    residual : ndarray, shape (n,), or dict of str to ndarray, optional
+        A dict where several signals have one each, by their names.
+    unit : str
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    rows = 1 if residual is None else 2
+    labels = [f"output<br>[{unit}]", f"residual<br>[{unit}]"][:rows]
+    figure = _rows(rows, 280 + 200 * (rows - 1), "time [s]", labels,
+                   weights=(0.6, 0.4) if rows == 2 else None)
+    colours = dict(zip(signals, (MEASURED, *SERIES)))
+    for name, values in signals.items():
+        # the measured signal shows on both sides of the model that is drawn upon it
+        _line(figure, *envelope(time_s, values), 1, name, colours[name],
+              width=3 if colours[name] is MEASURED else 1.2)
+    if isinstance(residual, dict):
+        for name, values in residual.items():
+            _line(figure, *envelope(time_s, values), 2, f"residual of the {name}", colours[name],
+                  legend=False)
+    elif residual is not None:
+        _line(figure, *envelope(time_s, residual), 2, "residual", RESIDUAL)
+    return figure
+
+
+def spectra(frequency_hz, densities, unit="output units", level=None,
+            colours=(MEASURED, RESIDUAL, *SERIES)):
+    """Amplitude spectral densities.
+
+    Parameters
+    ----------
+    frequency_hz : ndarray, shape (m,)
+    densities : dict of str to ndarray, shape (m,)
+    unit : str
+        Of the signals.
+    level : float, optional
+        Density of white noise, drawn as a line.
+    colours : sequence of str
+        Of the densities in their order.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    figure = _rows(1, 420, "frequency [Hz]", [f"density [{unit}/√Hz]"], x_type="log")
+    above = frequency_hz > 0
+    for (name, values), colour in zip(densities.items(), colours):
+        _line(figure, frequency_hz[above], values[above], 1, name, colour,
+              legend=len(densities) > 1 or level is not None)
+    if level is not None:
+        _line(figure, frequency_hz[above][[0, -1]], np.full(2, level), 1, "white noise", MODEL,
+              dash="dot")
+    figure.update_yaxes(type="log", exponentformat="power")
+    return figure
+
+
+def correlation(lags, values, bound, x_label="lag [samples]", y_label="correlation"):
+    """Correlation over lags, and the interval in which chance alone leaves it.
+
+    Parameters
+    ----------
+    lags, values : ndarray, shape (m,)
+    bound : float or ndarray, shape (m,)
+        Half-width of the interval about zero.
+    x_label, y_label : str
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    figure = _rows(1, 320, x_label, [y_label])
+    bound = np.broadcast_to(bound, np.shape(lags))
+    _band(figure, lags, -bound, bound, 1, name="chance alone")
+    stems = np.full(3 * len(lags), np.nan)
+    stems[0::3], stems[1::3] = 0, values
+    _line(figure, np.repeat(lags, 3), stems, 1, "", RESIDUAL, legend=False)
+    _add(figure, 1, x=lags, y=values, mode="markers", name=y_label, showlegend=False,
+         marker={"color": RESIDUAL, "size": 4})
+    return figure
+
+
+def bars(labels, series, y_label, log=False):
+    """Groups of bars, one group per label.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        Such as frequency bands.
+    series : dict of str to sequence of float
+    y_label : str
+    log : bool
+        Logarithmic heights, for what spans decades.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    figure = _rows(1, 360, "", [y_label])
+    for (name, values), colour in zip(series.items(), SERIES):
+        figure.add_bar(x=list(labels), y=np.asarray(values, float), name=name,
+                       marker={"color": colour}, showlegend=len(series) > 1)
+    figure.update_xaxes(type="category", showgrid=False)
+    figure.update_yaxes(type="log" if log else "linear")
+    return figure
+
+
+def lines(x, series, x_label, y_label, band=None, points=None, log=""):
+    """Lines over a common axis, with an interval and measured points where there are.
+
+    Parameters
+    ----------
+    x : ndarray, shape (m,)
+    series : dict of str to ndarray, shape (m,)
+    x_label, y_label : str
+    band : tuple of two ndarray, shape (m,), optional
+        Limits of a 95 % interval.
+    points : tuple of ndarray, shape (k,), optional
+        Places, values and, as a third, standard uncertainties.
+    log : str
+        Letters of the axes that are logarithmic: ``"x"``, ``"y"``, ``"xy"``.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    figure = _rows(1, 380, x_label, [y_label], x_type="log" if "x" in log else "linear")
+    if band is not None:
+        _band(figure, x, *band, 1)
+    if points is not None:
+        _points(figure, points[0], points[1], 1, points[2] if len(points) > 2 else None)
+    alone = len(series) == 1 and band is None and points is None
+    for (name, values), colour in zip(series.items(), SERIES):
+        _line(figure, *envelope(x, values), 1, name, colour, legend=not alone)
+    if "y" in log:
+        figure.update_yaxes(type="log")
+    return figure
+
+
+def envelope(x, values, most=MOST_POINTS):
+    """Thin a long signal to the smallest and largest value of each of many short stretches.
+
+    Parameters
+    ----------
+    x, values : ndarray, shape (n,)
+    most : int
+        Largest number of points.
+
+    Returns
+    -------
+    x, values : ndarray, shape (m,)
+        Those points in their order; all of a signal of at most `most`. A stretch of NaN alone
+        leaves one.
+    """
+    n = len(values)
+    if n <= most:
+        return x, values
+    size = -(-2 * n // most)
+    starts = np.arange(0, n, size)
+    padded = np.full(len(starts) * size, np.nan)
+    padded[:n] = values
+    stretches = padded.reshape(-1, size)
+    missing = np.isnan(stretches)
+    ends = np.stack([np.argmin(np.where(missing, np.inf, stretches), axis=1),
+                     np.argmax(np.where(missing, -np.inf, stretches), axis=1)], axis=1)
+    # a stretch without spread, or without any value, is one point
+    chosen = np.unique(np.sort(ends, axis=1) + starts[:, None])
+    return np.asarray(x)[chosen], np.asarray(values)[chosen]
+
+
+def _rows(rows, height, x_label, y_labels, weights=None, x_type="linear"):
+    """Empty figure of panels above each other on a common axis."""
+    require_plotly()
+    from plotly.subplots import make_subplots
+    figure = make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.06,
+                           row_heights=list(weights) if weights else None)
+    figure.update_layout(
+        template="none", height=height, margin={"l": 76, "r": 16, "t": 34, "b": 52},
+        font={"family": _FONT, "size": 13},
+        legend={"orientation": "h", "x": 0, "y": 1, "yanchor": "bottom"}, hovermode="closest")
+    figure.update_xaxes(type=x_type, showline=True, ticks="outside", zeroline=False, mirror=True)
+    figure.update_yaxes(showline=True, ticks="outside", zeroline=False, mirror=True,
+                        automargin=True, title={"standoff": 8})
+    if x_type == "log":
+        figure.update_xaxes(dtick="D2")
+    figure.update_xaxes(title={"text": x_label}, row=rows, col=1)
+    for row, label in enumerate(y_labels, 1):
+        figure.update_yaxes(title={"text": label}, row=row, col=1)
+    return figure
+
+
+def _line(figure, x, y, row, name, colour, legend=True, dash="solid", width=1.4):
+    _add(figure, row, x=x, y=y, mode="lines", name=name, showlegend=legend,
+         line={"color": colour, "width": width, "dash": dash})
+
+
+def _points(figure, x, y, row, std=None, legend=True):
+    error = None if std is None else {"array": COVERAGE_FACTOR * std, "thickness": 1, "width": 2}
+    _add(figure, row, x=x, y=y, mode="markers", name="measured", showlegend=legend, error_y=error,
+         marker={"color": RESIDUAL, "size": 4})
+
+
+def _band(figure, x, low, high, row, name="95 % interval", legend=True):
+    _add(figure, row, x=np.r_[x, x[::-1]], y=np.r_[high, low[::-1]], mode="lines", fill="toself",
+         name=name, showlegend=legend, hoverinfo="skip", line={"width": 0, "color": MODEL},
+         fillcolor="rgba(47, 134, 201, 0.25)")
+
+
+def _focus(figure, values, row):
+    """Let the middle of the values choose the range: a few wild ones must not hide the rest."""
+    size = np.nanpercentile(np.abs(values), 90) if len(values) else 0
+    if size > 0:
+        figure.update_yaxes(range=[-2.5 * size, 2.5 * size], row=row, col=1)
+
+
+def _add(figure, row, **trace):
+    figure.add_scatter(**trace, row=row, col=1)

@@ -1,0 +1,88 @@
+"""Which cases the suite runs."""
+
+from typing import NamedTuple
+
+import numpy as np
+from rig.hidden import draw_causes
+from rig.sensor import CAUSES, UNCATALOGUED
+
+GROUPS = ("single", "multiple", "clean", "outside", "without_model", "power")
+
+PER_CAUSE, CLEAN, MULTIPLE, OUTSIDE_PER_CAUSE, POWER_PER_CAUSE = 20, 100, 60, 10, 24
+WITHOUT_MODEL_EVERY = 10
+POWER_TIMES_NOISE = 0.03, 10.0
+
+
+class Trial(NamedTuple):
+    """One diagnosis.
+
+    Attributes
+    ----------
+    group : str
+        Of `GROUPS`.
+    name : str
+        Unique.
+    seed : int
+    causes : tuple of str
+        What is hidden.
+    times_noise : float or None
+        RMS of the effect over the noise's; None for that of `rig.hidden.draw_case`.
+    """
+
+    group: str
+    name: str
+    seed: int
+    causes: tuple
+    times_noise: float | None = None
+
+
+def plan(seed_set, groups=GROUPS, first=None):
+    """Trials in an order in which every part of the suite advances evenly.
+
+    Parameters
+    ----------
+    seed_set : int
+        Sets have no seed in common: what was tuned on one is judged on another.
+    groups : sequence of str
+    first : int, optional
+        Only so many of each cause, and of the clean and the multiple ones.
+
+    Returns
+    -------
+    list of Trial
+    """
+    base = 100_000 * (seed_set + 1)
+
+    def trials(group, causes, count, offset, strengths=None):
+        label = "+".join(sorted(causes)) or "none"
+        return [Trial(group, f"{group}/{label}/{i}", base + offset + i, tuple(sorted(causes)),
+                      None if strengths is None else float(strengths[i])) for i in range(count)]
+
+    single = [trials("single", [cause], PER_CAUSE, 0) for cause in CAUSES]
+    clean = trials("clean", [], CLEAN, 10_000)
+    smallest, largest = POWER_TIMES_NOISE
+    shares = (np.arange(POWER_PER_CAUSE) + 0.5) / POWER_PER_CAUSE
+    # strong and weak ones alternate, so that the first few span the range
+    shares = shares[np.argsort(np.arange(POWER_PER_CAUSE) * 7 % POWER_PER_CAUSE)]
+    strengths = smallest * (largest / smallest) ** shares
+    multiple = [t for i in range(MULTIPLE) for t in _renumbered(trials(
+        "multiple", draw_causes(base + 20_000 + i, 2 + i % 2), 1, 20_000 + i), i)]
+    families = {
+        "single": single,
+        "clean": [clean],
+        "multiple": [multiple],
+        "outside": [trials("outside", [cause], OUTSIDE_PER_CAUSE, 30_000)
+                    for cause in UNCATALOGUED],
+        # the same records as with a model
+        "without_model": [[t._replace(group="without_model", name=f"without_model/{t.name}")
+                           for t in family[::WITHOUT_MODEL_EVERY]] for family in (*single, clean)],
+        "power": [trials("power", [cause], POWER_PER_CAUSE, 40_000, strengths)
+                  for cause in CAUSES],
+    }
+    chosen = [family[:first] for group in groups for family in families[group]]
+    order = [(i / len(family), trial) for family in chosen for i, trial in enumerate(family)]
+    return [trial for _, trial in sorted(order, key=lambda entry: entry[0])]
+
+
+def _renumbered(trials, number):
+    return [t._replace(name=t.name.rsplit("/", 1)[0] + f"/{number}") for t in trials]

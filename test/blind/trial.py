@@ -1,0 +1,86 @@
+"""One trial: draw a case, have it diagnosed, keep what the judge needs."""
+
+import time
+
+import numpy as np
+from rig.hidden import draw_case
+
+from frac_accel.errors import FracAccelError
+
+
+def run(trial, diagnose=None):
+    """Row of one trial, of plain values.
+
+    A refusal (`FracAccelError`) is a result; any other exception is one too, as a crash, so that
+    one of them does not end a suite of hours.
+
+    Parameters
+    ----------
+    trial : Trial
+    diagnose : callable, optional
+        Default: `frac_accel.diagnose`.
+    """
+    if diagnose is None:
+        from frac_accel import diagnose
+    case = draw_case(trial.seed, trial.causes, times_noise=trial.times_noise)
+    reference, sensor, temperature = case.samples()
+    row = {**trial._asdict(), "kind": case.kind, "excitation": case.excitation,
+           "samples": len(sensor.stamps_ns), "truth": case.truth, "core": case.baseline.core,
+           "strength": {cause: rms / case.noise_std for cause, rms in case.effect_rms.items()},
+           "oracle_rmse": oracle_rmse(case), "verdict": None, "error": None, "findings": {},
+           "extended_rmse": None, "correction": None}
+    model = None if trial.group == "without_model" else case.model()
+    begin = time.process_time()
+    try:
+        found = diagnose((reference, sensor), model=model, axis="x", temperature=temperature)
+        row["cpu_s"] = time.process_time() - begin
+        result = found.as_dict()
+    except FracAccelError as error:
+        return {**row, "cpu_s": time.process_time() - begin, "error": f"refused: {error}"}
+    except Exception as error:  # whatever it is, it counts against the diagnosis
+        return {**row, "cpu_s": time.process_time() - begin,
+                "error": f"crashed: {type(error).__name__}: {error}"}
+    row["verdict"] = result["verdict"]
+    row["findings"] = {finding["cause"]: finding["parameters"] for finding in result["findings"]}
+    row["extended_rmse"] = _finite(result["extended"]["rmse"])
+    if trial.group in ("single", "multiple") and result["findings"]:
+        row["correction"] = corrections(case, found.model)
+    return row
+
+
+def oracle_rmse(case):
+    """Error on axis x of the true sensor with its true parameters: what no fit can go below.
+
+    Clipping and quantisation act on the noise too: the oracle applies them to what it knows.
+    """
+    values = case.record.clean[:, 0]
+    if "clipping" in case.truth:
+        values = np.clip(values, case.truth["clipping"]["lower"], case.truth["clipping"]["upper"])
+    if "quantization" in case.truth:
+        step = case.truth["quantization"]["step"]
+        values = step * np.round(values / step)
+    return float(np.sqrt(np.mean(np.square(case.record.sensor[:, 0] - values))))
+
+
+def corrections(case, extended):
+    """NRMSE after correction by the model in use, the extended and the true one.
+
+    All three have the bandwidth that the true model's inverse chooses. Returns the words of the
+    error where one of them cannot be inverted.
+    """
+    from frac_accel.model import SensorModel
+    from frac_accel.validation import validate
+
+    reference, sensor, _ = case.samples()
+    try:
+        oracle = validate(reference, sensor, SensorModel.from_dict(case.sensor.to_model()))
+        wish = {"bandwidth_hz": oracle.filters["axes"]["x"]["band_hz"][1]}
+        judged = {"oracle": oracle, "extended": validate(reference, sensor, extended, **wish),
+                  "in_use": validate(reference, sensor, case.model(), **wish)}
+        return {name: v.comparison.corrected.total.nrmse for name, v in judged.items()}
+    except Exception as error:  # as in `run`
+        return f"{type(error).__name__}: {error}"
+
+
+def _finite(value):
+    return float(value) if value is not None and np.isfinite(value) else None
