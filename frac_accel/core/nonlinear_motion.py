@@ -29,10 +29,10 @@ _TURN_PASSES = 4
 _TURNED = 1e-5          # of a step, the permitted error of a turn
 
 _fast = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
-_exact = numba.njit(cache=True, error_model="numpy")
-_inlined = numba.njit(cache=True, error_model="numpy", inline="always")
+_exact = numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+_inlined = numba.njit(cache=True, error_model="numpy", inline="always", fastmath={"contract"})
 
-_follow_one_way = _exact(follow_one_way)
+_follow_one_way = _inlined(follow_one_way)
 
 
 def deviation(modes, force, step, motion, start):
@@ -83,7 +83,7 @@ def _middles(motion):
     return (150 * (f[2] + f[3]) - 25 * (f[1] + f[4]) + 3 * (f[0] + f[5])) / 256
 
 
-@_exact
+@_inlined
 def _moments(z):
     """Integrals over x from 0 to 1 of exp(z (1 - x)) x**k, for k = 0, 1, 2; and exp(z)."""
     if abs(z) > 0.5:
@@ -104,7 +104,7 @@ def _moments(z):
     return m0, m1, m2, 1 + z * m0
 
 
-@_exact
+@_inlined
 def _prepare_mode(j, length, pole, residue, rows, gains, sums):
     for i in range(2):
         part = 0.5 * (i + 1)
@@ -175,7 +175,7 @@ def _parabola(n0, nm, ne):
     return n0, -3 * n0 + 4 * nm - ne, 2 * n0 - 4 * nm + 2 * ne
 
 
-@_exact
+@_inlined
 def _at(motion, order, index, part):
     """Motion `part` of an interval after grid point `index`: polynomial through six points."""
     first = min(max(index - 2, 0), motion.shape[1] - 6)
@@ -198,7 +198,7 @@ def _power_terms(terms, q):
     return total * q
 
 
-@_exact
+@_inlined
 def _follow(z, q0, v0, q1, v1, duration, beta, gamma):
     """Bouc-Wen variable after q has gone from q0 to q1 with the velocities v0 and v1 at the ends.
 
@@ -218,7 +218,7 @@ def _motion(free, sums, i, order, p0, p1, p2):
                              + p2 * sums[i, order, 2])
 
 
-@_exact
+@_inlined
 def _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameters):
     """Force in the middle and at the end of a step without a turn, and the hysteresis there.
 
