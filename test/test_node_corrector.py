@@ -106,11 +106,13 @@ def test_live_is_offline_to_the_last_bit_and_nothing_is_lost(record, model_file,
                 "bag": tmp_path / "live.mcap", "topics": [CORRECTED_TOPIC],
                 "idle_timeout_s": 3.0}) as recorder, \
             NodeProcess("corrector", environment, {
-                "model_file": model_file, "sample_rate_hz": RATE_HZ}) as corrector, \
-            NodeProcess("player", environment, {
+                "model_file": model_file, "sample_rate_hz": RATE_HZ}) as corrector:
+        # what is played before the recorder has found the corrected topic is not recorded
+        recorder.wait_for(f"recording {CORRECTED_TOPIC} ")
+        with NodeProcess("player", environment, {
                 "bag": tmp_path / "raw.mcap", "wait_for_subscribers": 1,
                 "start_delay_s": 1.0}) as player:
-        assert player.wait() == 0, player.text
+            assert player.wait() == 0, player.text
         assert recorder.wait() == 0, recorder.text
         assert corrector.stop() == 0, corrector.text
     live = read_bag(tmp_path / "live.mcap")[CORRECTED_TOPIC]

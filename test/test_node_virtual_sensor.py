@@ -41,11 +41,13 @@ def played(reference, parameters, folder):
             NodeProcess("recorder", environment, {
                 "bag": folder / "raw.mcap", "topics": [RAW_TOPIC],
                 "idle_timeout_s": 2.0}) as recorder, \
-            NodeProcess("virtual_sensor", environment, parameters) as node, \
-            NodeProcess("player", environment, {
+            NodeProcess("virtual_sensor", environment, parameters) as node:
+        # what is played before the recorder has found the raw topic is not recorded
+        recorder.wait_for(f"recording {RAW_TOPIC} ")
+        with NodeProcess("player", environment, {
                 "bag": folder / "reference.mcap", "wait_for_subscribers": 1,
                 "start_delay_s": 1.0}) as player:
-        assert player.wait() == 0, player.text
+            assert player.wait() == 0, player.text
         assert recorder.wait() == 0, recorder.text
         assert node.stop() == 0, node.text
     return read_bag(folder / "raw.mcap")[RAW_TOPIC]
