@@ -43,6 +43,12 @@ class CrossAxisSensitivity(Effect):
         inverse = _inverse(tuple(by_axis.items()))
         return _mix(values, inverse), _mix(variance, inverse**2)
 
+    @classmethod
+    def starts(cls, view):
+        others = [axis for axis in "xyz" if view.excited[axis] and axis != view.axis]
+        return [Start(cls(**dict.fromkeys(others, 1e-3)),
+                      tuple(cls(**{axis: 1e-3}) for axis in others), "free")] if others else []
+
 
 @functools.lru_cache
 def _inverse(by_axis):
@@ -56,9 +62,3 @@ def _inverse(by_axis):
 def _mix(values, matrix):
     """values @ matrix.T, summed in a fixed order: BLAS would round by the block's length."""
     return sum(values[:, [axis]] * matrix[:, axis] for axis in range(3))
-
-    @classmethod
-    def starts(cls, view):
-        others = [axis for axis in "xyz" if view.excited[axis] and axis != view.axis]
-        return [Start(cls(**dict.fromkeys(others, 1e-3)),
-                      tuple(cls(**{axis: 1e-3}) for axis in others), "free")] if others else []

@@ -33,6 +33,11 @@ class ToneInterference(Effect):
     def invert(self, values, variance, circumstances):
         return values - self._tone(circumstances), variance
 
+    @classmethod
+    def starts(cls, view):
+        line = strongest_line(view)
+        return [finite(cls(*line))] if line else []
+
     def live(self, sampling_rate_hz):
         """In a stream the phase is not known: it is found."""
         return _Tracker(self, sampling_rate_hz)
@@ -79,8 +84,3 @@ class _Tracker:
         found = 2 * sums / weight * worth
         return (values - (found.real * tone.real - found.imag * tone.imag),
                 variance + worth * doubt / 2)
-
-    @classmethod
-    def starts(cls, view):
-        line = strongest_line(view)
-        return [finite(cls(*line))] if line else []

@@ -1,0 +1,23 @@
+"""Every cause that is fitted says where its fit begins."""
+
+import pytest
+from rig.hidden import draw_case
+
+from frac_accel import diagnose
+from frac_accel.effects import known_effects
+
+
+@pytest.fixture(scope="module")
+def view():
+    case = draw_case(7, ["temperature_sensitivity"])
+    reference, sensor, temperature = case.samples()
+    found = diagnose((reference, sensor), case.model(), temperature=temperature)
+    return found.engine.search.view(found.engine.search.fit(found.engine.search.base))
+
+
+@pytest.mark.parametrize(
+    "cause", [cause for cause, effect in known_effects().items() if not effect.read_off])
+def test_a_fit_of_every_cause_begins_somewhere(view, cause):
+    starts = known_effects()[cause].starts(view)
+    assert starts
+    assert all(start.effect.cause == cause for start in starts)
