@@ -1,6 +1,7 @@
 """Fit of named causes to a record by simulation error."""
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from ..simulation import AxisSimulator
 _EDGE = 64
 _ITERATIONS = 12
 _STEP = 1e-3
+# Outputs of the other axes that are kept.
+_KEPT = 8
 # A gain of this share of one sample's error changes nothing that the data can tell.
 _SMALL_GAIN = 1e-2
 
@@ -36,6 +39,10 @@ class Fitted:
         Derivatives of the output by the unknowns, clear of free motions.
     unknowns : tuple of Unknown
     theta : ndarray, shape (p,)
+    free : ndarray, shape (n, m)
+        Orthonormal free motions.
+    settled : bool
+        Whether more iterations would gain nothing that counts.
     """
 
     effects: dict
@@ -46,11 +53,24 @@ class Fitted:
     unknowns: tuple
     theta: np.ndarray
     free: np.ndarray
+    settled: bool
 
     @property
     def causes(self):
         """Names of the causes."""
         return frozenset(self.effects)
+
+
+class _Point(NamedTuple):
+    """Output and error with certain parameters."""
+
+    effects: dict
+    simulated: np.ndarray
+    columns: np.ndarray
+    free: np.ndarray
+    left: np.ndarray | None
+    residual: np.ndarray
+    cost: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,7 +107,7 @@ class Problem:
         edge = min(_EDGE, len(record) // 16)
         self.used[:edge] = self.used[-edge:] = False
         self._simulators = {}
-        self._last = None, None
+        self._last, self._others = (None, None), {}
         self.calls = 0
 
     @property
@@ -117,15 +137,17 @@ class Problem:
         others = tuple(e for e in model.effects if e.cause != "time_delay")
         return AxisModel(model.core, (*others, TimeDelay(model.delay_s - lag)))
 
-    def simulate(self, effects):
-        """Output of the axis with these causes, shape (n,)."""
+    def simulate(self, effects, across=True):
+        """Output of the axis with these causes, shape (n,); without what comes across if asked."""
         self.calls += 1
         model = self._on_stamps(self.axis_model(effects))
         simulator = self.simulator(self.axis)
         values = simulator.respond(model)
         for effect in model.effects:
-            values = values + self._across(effects, effect) if effect.stage == CROSS_AXIS \
-                else effect.simulate(values, simulator.circumstances)
+            if effect.stage != CROSS_AXIS:
+                values = effect.simulate(values, simulator.circumstances)
+            elif across:
+                values = values + self._across(effects, effect)
         return values
 
     def _across(self, effects, cross):
@@ -136,15 +158,20 @@ class Problem:
             if other == self.axis or not share or not np.ptp(self.record.reference[:, other]):
                 continue
             model = self._on_stamps(self.axis_model(effects, other))
-            model = AxisModel(model.core, tuple(e for e in model.effects if e.stage < CROSS_AXIS))
-            total += share * self.simulator(other).simulate(model)
+            before = tuple(e for e in model.effects if e.stage < CROSS_AXIS)
+            if (other, before) not in self._others:
+                while len(self._others) >= _KEPT:
+                    del self._others[next(iter(self._others))]
+                self._others[other, before] = self.simulator(other).simulate(
+                    AxisModel(model.core, before))
+            total += share * self._others[other, before]
         return total
 
     def change(self, effects, cause, effect):
         """First-order change of the output, shape (n,), when a cause is added or changed.
 
-        Forces of the spring act on the linear motion, and other causes as if there were no such
-        forces: cheap, and right for small ones.
+        Forces of the spring act on the linear motion, other causes as if there were no such forces,
+        and what comes across from the other axes stays as it is: cheap, and right for small ones.
         """
         linear = {name: other for name, other in effects.items()
                   if not acts_on_spring(other) and name != cause}
@@ -159,31 +186,41 @@ class Problem:
                     added = later.simulate(added, self.simulator(self.axis).circumstances)
             return added
         before = {**linear, cause: effects[cause]} if cause in effects else linear
-        return self.simulate({**linear, cause: effect}) - self._remembered(before)
+        across = effect.stage == CROSS_AXIS
+        return self.simulate({**linear, cause: effect}, across) - self._remembered(before, across)
 
     def force(self, model, effect):
         """First-order response to a force."""
         from .first_order import force_response
         return force_response(self.simulator(self.axis), model, effect, self.rate)
 
-    def _remembered(self, effects):
+    def _remembered(self, effects, across):
         """Output with these causes; the last one is kept."""
-        key = tuple(effects.items())
+        key = across, *effects.items()
         if self._last[0] != key:
-            self._last = key, self.simulate(effects)
+            self._last = key, self.simulate(effects, across)
         return self._last[1]
 
-    def free_motions(self, effects):
-        """Orthonormal columns, shape (n, m): what the time before the record may have left."""
+    def free_columns(self, effects):
+        """What the time before the record may have left, shape (n, m); 0 where none counts."""
         try:
             poles = np.atleast_1d(self.axis_model(effects).poles())
         except (FracAccelError, ArithmeticError):
             poles = np.array([])
-        columns = []
         core = self.axis_model(effects).effective_core
+        rates = []
         if getattr(core, "damping_order", 1.0) != 1.0:
             rates = np.geomspace(2 / self.time[-1], 2 * np.pi * core.natural_frequency_hz, 4)
-            columns += [np.exp(-rate * self.time) for rate in rates]
+        return self._decays([*(-rate + 0j for rate in rates), *poles])
+
+    def own_motions(self, effect):
+        """Orthonormal columns, shape (n, m): slow motions that a cause of its own may have left."""
+        slow = [pole for pole in np.atleast_1d(effect.poles())
+                if -pole.real * _EDGE < self.rate]
+        return _basis(self._decays(slow))
+
+    def _decays(self, poles):
+        columns = []
         for pole in poles:
             if pole.imag < 0 or -pole.real * self.time[-1] < 1:
                 continue
@@ -192,10 +229,7 @@ class Problem:
             columns += [decay] if pole.imag == 0 else [decay * np.cos(turn), decay * np.sin(turn)]
         columns = [column * self.used for column in columns]
         columns = [column for column in columns if np.max(np.abs(column)) > 1e-9]
-        if not columns:
-            return np.zeros((len(self.record), 0))
-        vectors, sizes, _ = np.linalg.svd(np.stack(columns, axis=1), full_matrices=False)
-        return vectors[:, sizes > 1e-6 * sizes[0]]
+        return np.stack(columns, axis=1) if columns else np.zeros((len(self.record), 0))
 
     def clear(self, values, free):
         """Values where they count, without the free motions; shape (n,) or (n, p)."""
@@ -218,63 +252,107 @@ class Problem:
         unknowns = tuple(unknown for cause in effects
                          for unknown in self.unknowns(effects[cause]))
         theta = np.array([_to_theta(getattr(effects[u.cause], u.name), u) for u in unknowns])
-        effects, free = dict(effects), self.free_motions(effects)
-        simulated = self.simulate(effects)
-        residual = self.clear(self.measured - simulated, free)
-        cost, damping = float(residual @ residual), 0.0
-        jacobian = self.jacobian(effects, unknowns, theta, simulated, free)
+        here, damping, settled = self._point(dict(effects)), 0.0, not unknowns
+        jacobian, exact = self.jacobian(here, unknowns, theta)
         for _ in range(iterations if unknowns else 0):
-            gram, slope = jacobian.T @ jacobian, jacobian.T @ residual
-            moved, last = False, cost
-            for _ in range(8):
+            gram, slope = jacobian.T @ jacobian, jacobian.T @ here.residual
+            small = _SMALL_GAIN * here.cost / self.count
+            there = None
+            for _ in range(8 if exact else 2):
                 step = _solve(gram + damping * np.diag(np.diag(gram)), slope)
+                if damping < 1e-2 and step @ slope < small:
+                    settled = exact
+                    break
                 trial = np.array([np.clip(value + np.clip(change, -1, 1), u.low, u.high)
                                   for value, change, u in zip(theta, step, unknowns)])
                 try:
-                    new = self.replaced(effects, unknowns, trial)
-                    output = self.simulate(new)
+                    there = self._point(self.replaced(here.effects, unknowns, trial))
                 except FracAccelError:
-                    output = None
-                if output is not None and np.isfinite(output).all():
-                    error = self.clear(self.measured - output, free)
-                    if error @ error < cost:
-                        moved = True
-                        break
-                damping = max(5 * damping, 1e-3)
-            if not moved:
-                break
-            theta, effects, simulated, residual = trial, new, output, error
-            cost = float(error @ error)
+                    there = None
+                if there is not None and there.cost < here.cost:
+                    break
+                there, damping = None, max(5 * damping, 1e-3)
+            if there is None:
+                if exact:
+                    break
+                (jacobian, exact), damping = self.jacobian(here, unknowns, theta), 0.0
+                continue
             damping = damping / 10 if damping > 1e-6 else 0.0
-            done = last - cost < _SMALL_GAIN * cost / self.count
-            free = self.free_motions(effects)
-            residual = self.clear(self.measured - simulated, free)
-            cost = float(residual @ residual)
-            jacobian = self.jacobian(effects, unknowns, theta, simulated, free)
-            if done and damping < 1e-2:
+            before, moved, gained = here, trial - theta, here.cost - there.cost
+            theta, here = trial, there
+            if exact and gained < small and damping < 1e-2:
+                settled = True
                 break
-        return Fitted(effects, simulated, residual, cost, jacobian, unknowns, theta, free)
+            jacobian, exact = self.jacobian(here, unknowns, theta, (jacobian, before, moved))
+        if not exact:
+            jacobian, _ = self.jacobian(here, unknowns, theta)
+        return Fitted(here.effects, here.simulated, here.residual, here.cost, jacobian, unknowns,
+                      theta, here.free, settled)
 
-    def jacobian(self, effects, unknowns, theta, simulated, free):
+    def _point(self, effects):
+        """Output and error with these parameters; raises FracAccelError where it has no bound."""
+        simulated = self.simulate(effects)
+        if not np.isfinite(simulated).all():
+            raise FracAccelError("the motion has no bound")
+        columns = self.free_columns(effects)
+        free = _basis(columns)
+        error = (self.measured - simulated) * self.used
+        residual = error - free @ (free.T @ error)
+        left = np.linalg.lstsq(columns, error - residual, rcond=1e-10)[0] if free.size else None
+        return _Point(effects, simulated, columns, free, left, residual,
+                      float(residual @ residual))
+
+    def jacobian(self, point, unknowns, theta, last=None):
+        """Derivatives of the output by the unknowns, shape (n, p), and whether they are exact.
+
+        Parameters
+        ----------
+        point : _Point
+        unknowns : tuple of Unknown
+        theta : ndarray, shape (p,)
+        last : tuple, optional
+            Derivatives at the last point, that point, and the step from there in `theta`: the
+            forces of the spring, which take long to integrate, are then not integrated again, but
+            their derivatives corrected by what the step has shown (C. G. Broyden, 1965).
+        """
         columns = np.zeros((len(self.record), len(unknowns)))
-        forced = any(map(acts_on_spring, effects.values()))
+        forced = any(map(acts_on_spring, point.effects.values()))
+        slow = np.array([acts_on_spring(point.effects[u.cause]) for u in unknowns], bool)
+        if last is not None and not slow.any():
+            last = None
         for i, unknown in enumerate(unknowns):
+            if last is not None and slow[i]:
+                continue
             for step in (_STEP, -_STEP):
                 moved = theta.copy()
                 moved[i] = np.clip(theta[i] + step, unknown.low, unknown.high)
                 if moved[i] == theta[i]:
                     continue
                 try:
-                    new = self.replaced(effects, unknowns, moved)
-                    if forced and not acts_on_spring(effects[unknown.cause]):
-                        change = self.change(effects, unknown.cause, new[unknown.cause])
+                    new = self.replaced(point.effects, unknowns, moved)
+                    if forced and not slow[i]:
+                        change = self.change(point.effects, unknown.cause, new[unknown.cause])
                     else:
-                        change = self.simulate(new) - simulated
+                        change = self.simulate(new) - point.simulated
                 except FracAccelError:
                     continue
+                if point.left is not None:
+                    free = self.free_columns(new)
+                    if free.shape == point.columns.shape:
+                        change = change + (free - point.columns) @ point.left
                 columns[:, i] = change / (moved[i] - theta[i])
                 break
-        return self.clear(columns, free)
+        columns = self.clear(columns, point.free)
+        if last is None:
+            return columns, True
+        before, start, step = last
+        columns[:, slow] = before[:, slow]
+        size = step[slow] @ step[slow]
+        if size > 0:
+            seen = self.clear(start.residual - point.residual, point.free)
+            missed = seen - 0.5 * (columns + before) @ step
+            columns[:, slow] += np.outer(missed, step[slow] / size)
+        return columns, False
 
     def replaced(self, effects, unknowns, theta):
         """Effects with the values of the unknowns."""
@@ -324,6 +402,14 @@ class Problem:
                    "phase_rad": 1.0, "amplitude": level, "damping_order": 1.0, "gain": 1.0,
                    "x": 1.0, "y": 1.0, "z": 1.0}
         return typical.get(name, max(abs(value), 1e-12))
+
+
+def _basis(columns):
+    """Orthonormal columns that span the same space."""
+    if not columns.shape[1]:
+        return columns
+    vectors, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    return vectors[:, sizes > 1e-6 * sizes[0]]
 
 
 def acts_on_spring(effect):

@@ -12,8 +12,10 @@ _BEAM = 3
 _REACH = (0.6, 1.6)
 _FITS = 8
 _MOST = 4
-# Iterations of a first trial, and the cost over the best one's with which it ends there.
-_TRIAL = 4
+# Iterations of a first trial, how many have another, and the cost over the best one's with which
+# a set is not fitted to the end.
+_TRIAL = 2
+_AGAIN = 4
 _HOPELESS = 4.0
 
 
@@ -58,18 +60,22 @@ class Search:
         trials = []
         for effects in sets:
             try:
-                trials.append((self.fits.get(frozenset(effects))
-                               or self.problem.fit(effects, _TRIAL), effects))
+                trials.append(self.fits.get(frozenset(effects))
+                              or self.problem.fit(effects, _TRIAL))
             except FracAccelError:
                 continue  # a motion without bound describes no record
-        best = min((fit.cost for fit, _ in trials), default=0.0)
-        fits = []
-        for trial, effects in trials:
-            key = frozenset(effects)
+        trials.sort(key=lambda fit: fit.cost)
+        for i, trial in enumerate(trials[:_AGAIN]):
+            if not trial.settled and trial.causes not in self.fits:
+                trials[i] = self.problem.fit(trial.effects, _TRIAL)
+        fits, best = [], np.inf
+        for trial in sorted(trials, key=lambda fit: fit.cost):
+            key = trial.causes
             if key not in self.fits:
-                self.fits[key] = self.problem.fit(trial.effects) \
-                    if trial.cost < _HOPELESS * best else trial
+                far = trial.settled or trial.cost > _HOPELESS * best
+                self.fits[key] = trial if far else self.problem.fit(trial.effects)
                 self.log(f"fit {sorted(key - set(self.base))}: {self.fits[key].cost:.6g}")
+            best = min(best, self.fits[key].cost)
             fits.append(self.fits[key])
         return sorted(fits, key=lambda fit: fit.cost)
 
@@ -105,18 +111,23 @@ class Search:
     def _option(self, start, fitted, cause, known):
         """(Cost to be expected, cause, effect to begin with) of one start, or None."""
         p, changes = self.problem, []
+        own = p.own_motions(start.effect)
+        own = _orthonormal(p.clear(own - known @ (known.T @ own), fitted.free))
+        residual = fitted.residual - own @ (own.T @ fitted.residual)
+        cost = float(residual @ residual)
         for effect in start.columns:
             try:
                 change = p.clear(p.change(fitted.effects, cause, effect), fitted.free)
             except FracAccelError:
                 return None
-            changes.append(change - known @ (known.T @ change))
+            change = change - known @ (known.T @ change)
+            changes.append(change - own @ (own.T @ change))
         if len(changes) > 1:
             basis = _orthonormal(np.stack(changes, axis=1))
-            explained = float(np.sum((basis.T @ fitted.residual)**2))
-            return fitted.cost - explained, cause, start.effect
-        size, shared = changes[0] @ changes[0], changes[0] @ fitted.residual
-        if size <= 1e-24 * fitted.cost:
+            explained = float(np.sum((basis.T @ residual)**2))
+            return cost - explained, cause, start.effect
+        size, shared = changes[0] @ changes[0], changes[0] @ residual
+        if size <= 1e-24 * cost:
             return None
         factor = shared / size
         if start.kind == "positive" and factor <= 0:
@@ -125,7 +136,7 @@ class Search:
             return None
         if start.kind in ("finite", "weak"):
             factor = np.clip(factor, _REACH[0] if start.kind == "finite" else 0.0, _REACH[1])
-        cost = fitted.cost - 2 * factor * shared + factor**2 * size
+        cost += factor**2 * size - 2 * factor * shared
         effect = start.effect
         if start.parameter:
             scaled = factor * getattr(effect, start.parameter)
