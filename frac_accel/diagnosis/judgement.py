@@ -242,7 +242,9 @@ def _extended(engine, effects):
     """The model in use with these causes on the diagnosed axis."""
     p = engine.problem
     own = p.axis_model(effects)
-    axes = {name: p.baseline.axis(name) for name in AXES}
+    # the stamps, and with them the clock, are the same for all axes
+    clock = {cause: effect for cause, effect in effects.items() if effect.clock_ratio() != 1}
+    axes = {name: p.axis_model(clock, i) for i, name in enumerate(AXES)}
     axes[AXES[p.axis]] = AxisModel(own.core, own.effects)
     return SensorModel(p.baseline.core, p.baseline.effects, axes, p.baseline.metadata)
 

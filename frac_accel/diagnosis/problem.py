@@ -83,6 +83,7 @@ class Unknown:
     scale: float
     low: float
     high: float
+    step: float
 
 
 class Problem:
@@ -253,15 +254,15 @@ class Problem:
                          for unknown in self.unknowns(effects[cause]))
         theta = np.array([_to_theta(getattr(effects[u.cause], u.name), u) for u in unknowns])
         here, damping, settled = self._point(dict(effects)), 0.0, not unknowns
-        jacobian, exact = self.jacobian(here, unknowns, theta)
+        jacobian = self.jacobian(here, unknowns, theta)
         for _ in range(iterations if unknowns else 0):
             gram, slope = jacobian.T @ jacobian, jacobian.T @ here.residual
             small = _SMALL_GAIN * here.cost / self.count
             there = None
-            for _ in range(8 if exact else 2):
+            for _ in range(8):
                 step = _solve(gram + damping * np.diag(np.diag(gram)), slope)
                 if damping < 1e-2 and step @ slope < small:
-                    settled = exact
+                    settled = True
                     break
                 trial = np.array([np.clip(value + np.clip(change, -1, 1), u.low, u.high)
                                   for value, change, u in zip(theta, step, unknowns)])
@@ -273,19 +274,13 @@ class Problem:
                     break
                 there, damping = None, max(5 * damping, 1e-3)
             if there is None:
-                if exact:
-                    break
-                (jacobian, exact), damping = self.jacobian(here, unknowns, theta), 0.0
-                continue
-            damping = damping / 10 if damping > 1e-6 else 0.0
-            before, moved, gained = here, trial - theta, here.cost - there.cost
-            theta, here = trial, there
-            if exact and gained < small and damping < 1e-2:
-                settled = True
                 break
-            jacobian, exact = self.jacobian(here, unknowns, theta, (jacobian, before, moved))
-        if not exact:
-            jacobian, _ = self.jacobian(here, unknowns, theta)
+            settled = here.cost - there.cost < small and damping < 1e-2
+            damping = damping / 10 if damping > 1e-6 else 0.0
+            theta, here = trial, there
+            jacobian = self.jacobian(here, unknowns, theta)
+            if settled:
+                break
         return Fitted(here.effects, here.simulated, here.residual, here.cost, jacobian, unknowns,
                       theta, here.free, settled)
 
@@ -302,35 +297,19 @@ class Problem:
         return _Point(effects, simulated, columns, free, left, residual,
                       float(residual @ residual))
 
-    def jacobian(self, point, unknowns, theta, last=None):
-        """Derivatives of the output by the unknowns, shape (n, p), and whether they are exact.
-
-        Parameters
-        ----------
-        point : _Point
-        unknowns : tuple of Unknown
-        theta : ndarray, shape (p,)
-        last : tuple, optional
-            Derivatives at the last point, that point, and the step from there in `theta`: the
-            forces of the spring, which take long to integrate, are then not integrated again, but
-            their derivatives corrected by what the step has shown (C. G. Broyden, 1965).
-        """
+    def jacobian(self, point, unknowns, theta):
+        """Derivatives of the output by the unknowns, shape (n, p)."""
         columns = np.zeros((len(self.record), len(unknowns)))
         forced = any(map(acts_on_spring, point.effects.values()))
-        slow = np.array([acts_on_spring(point.effects[u.cause]) for u in unknowns], bool)
-        if last is not None and not slow.any():
-            last = None
         for i, unknown in enumerate(unknowns):
-            if last is not None and slow[i]:
-                continue
-            for step in (_STEP, -_STEP):
+            for step in (unknown.step, -unknown.step):
                 moved = theta.copy()
                 moved[i] = np.clip(theta[i] + step, unknown.low, unknown.high)
                 if moved[i] == theta[i]:
                     continue
                 try:
                     new = self.replaced(point.effects, unknowns, moved)
-                    if forced and not slow[i]:
+                    if forced and not acts_on_spring(point.effects[unknown.cause]):
                         change = self.change(point.effects, unknown.cause, new[unknown.cause])
                     else:
                         change = self.simulate(new) - point.simulated
@@ -342,17 +321,7 @@ class Problem:
                         change = change + (free - point.columns) @ point.left
                 columns[:, i] = change / (moved[i] - theta[i])
                 break
-        columns = self.clear(columns, point.free)
-        if last is None:
-            return columns, True
-        before, start, step = last
-        columns[:, slow] = before[:, slow]
-        size = step[slow] @ step[slow]
-        if size > 0:
-            seen = self.clear(start.residual - point.residual, point.free)
-            missed = seen - 0.5 * (columns + before) @ step
-            columns[:, slow] += np.outer(missed, step[slow] / size)
-        return columns, False
+        return self.clear(columns, point.free)
 
     def replaced(self, effects, unknowns, theta):
         """Effects with the values of the unknowns."""
@@ -382,7 +351,8 @@ class Problem:
             else:
                 span = 1e-3 if np.isfinite(low) and np.isfinite(high) else 0
                 low, high = low / scale + span, high / scale - span
-            result.append(Unknown(effect.cause, field.name, logarithmic, scale, low, high))
+            result.append(Unknown(effect.cause, field.name, logarithmic, scale, low, high,
+                                  effect.steps.get(field.name, _STEP)))
         return result
 
     def reach(self, name, scale):

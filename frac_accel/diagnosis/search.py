@@ -12,10 +12,11 @@ _BEAM = 3
 _REACH = (0.6, 1.6)
 _FITS = 8
 _MOST = 4
-# Iterations of a first trial, how many have another, and the cost over the best one's with which
-# a set is not fitted to the end.
-_TRIAL = 2
-_AGAIN = 4
+# A third cause that takes away less of what is left, and leaves more than noise, ends the search:
+# causes are being added up to imitate one that is not known.
+_STUCK = 0.2
+# Iterations of a first trial, and the cost over the best one's with which it ends there.
+_TRIAL = 4
 _HOPELESS = 4.0
 
 
@@ -64,18 +65,13 @@ class Search:
                               or self.problem.fit(effects, _TRIAL))
             except FracAccelError:
                 continue  # a motion without bound describes no record
-        trials.sort(key=lambda fit: fit.cost)
-        for i, trial in enumerate(trials[:_AGAIN]):
-            if not trial.settled and trial.causes not in self.fits:
-                trials[i] = self.problem.fit(trial.effects, _TRIAL)
-        fits, best = [], np.inf
-        for trial in sorted(trials, key=lambda fit: fit.cost):
+        best, fits = min((fit.cost for fit in trials), default=0.0), []
+        for trial in trials:
             key = trial.causes
             if key not in self.fits:
                 far = trial.settled or trial.cost > _HOPELESS * best
                 self.fits[key] = trial if far else self.problem.fit(trial.effects)
                 self.log(f"fit {sorted(key - set(self.base))}: {self.fits[key].cost:.6g}")
-            best = min(best, self.fits[key].cost)
             fits.append(self.fits[key])
         return sorted(fits, key=lambda fit: fit.cost)
 
@@ -161,7 +157,7 @@ class Search:
         if seed:
             beam = sorted([*beam, self.fit({**self.base, **seed})], key=lambda fit: fit.cost)
         best = beam[0]
-        for _ in range(most):
+        for added in range(most):
             wanted = {}
             least = best.cost - threshold(best) if done(best) else np.inf
             for parent in beam:
@@ -174,7 +170,9 @@ class Search:
             fits = self.fit_all([effects for _, effects in chosen])
             if not fits or best.cost - fits[0].cost < threshold(best):
                 break
-            best, beam = fits[0], fits[:_BEAM]
+            gained, best, beam = 1 - fits[0].cost / best.cost, fits[0], fits[:_BEAM]
+            if added >= 2 and gained < _STUCK and not done(best):
+                break
         return self.prune(best, threshold)
 
     def prune(self, best, threshold):

@@ -57,6 +57,9 @@ class Effect:
     # True for what is read off a record's stamps and values, and never fitted
     read_off: ClassVar[bool] = False
 
+    # Relative changes of parameters for numerical derivatives, where the usual one is too large.
+    steps: ClassVar[dict[str, float]] = {}
+
     @classmethod
     def starts(cls, view):
         """Where a fit of this cause to a record may begin.

@@ -22,6 +22,9 @@ class ToneInterference(Effect):
     explanation = "A tone from elsewhere, such as mains hum, is added to the output."
     experiment = "Record at rest: a tone from elsewhere is still there."
 
+    # the phase at a record's end must change by little
+    steps = {"frequency_hz": 1e-8}
+
     frequency_hz: float = parameter("Hz", above=0)
     amplitude: float = parameter("output units", minimum=0)
     # of the sine at the record's start

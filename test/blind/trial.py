@@ -71,10 +71,14 @@ def corrections(case, extended):
     from frac_accel.model import SensorModel
     from frac_accel.validation import validate
 
-    reference, sensor, _ = case.samples()
+    reference, sensor, temperature = case.samples()
+    wish = {}
+    if temperature is not None:
+        stamps, celsius = temperature
+        wish["temperature_at"] = lambda at: np.interp(at, stamps, celsius)
     try:
-        oracle = validate(reference, sensor, SensorModel.from_dict(case.sensor.to_model()))
-        wish = {"bandwidth_hz": oracle.filters["axes"]["x"]["band_hz"][1]}
+        oracle = validate(reference, sensor, SensorModel.from_dict(case.sensor.to_model()), **wish)
+        wish["bandwidth_hz"] = oracle.filters["axes"]["x"]["band_hz"][1]
         judged = {"oracle": oracle, "extended": validate(reference, sensor, extended, **wish),
                   "in_use": validate(reference, sensor, case.model(), **wish)}
         return {name: v.comparison.corrected.total.nrmse for name, v in judged.items()}
