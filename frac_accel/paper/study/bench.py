@@ -1,0 +1,119 @@
+"""The bench's recorded bags: models identified from noise, judged on sines."""
+
+import dataclasses
+from pathlib import Path
+
+from ...errors import BagError, IdentificationError
+from ...identification import identify
+from ...pair import load_pair
+from .candidates import STRUCTURES, fitted
+from .judge import Sines, judge
+from .sweep import best, damping_orders, sweep, table_4
+
+BAGS = Path(__file__).resolve().parents[3] / "bags"
+# The sensors of the bench, and those whose orders are swept.
+SENSORS = {"classical": "classical sensor, damping order 1",
+           "fractional": "fractional sensor, damping order 0.6",
+           "lagging": "classical sensor behind a low-pass that the models do not know of"}
+SWEPT = ("classical", "fractional")
+ONE_SINE = "paper_bench_one_sine.mcap"
+
+
+@dataclasses.dataclass(frozen=True)
+class BenchResult:
+    """One sensor of the bench.
+
+    Attributes
+    ----------
+    name, words : str
+    frequency_hz : ndarray, shape (m,)
+        Of the sines.
+    fitted : dict of str to Fitted
+    judged : dict of str to Judged
+    chosen, reason : str
+        Structure that ``identify`` chooses, and why.
+    by_damping_order, by_table_4 : list of SweptOrder
+        Empty where the orders are not swept.
+    """
+
+    name: str
+    words: str
+    frequency_hz: object
+    fitted: dict
+    judged: dict
+    chosen: str
+    reason: str
+    by_damping_order: list
+    by_table_4: list
+
+    def as_dict(self):
+        """Plain numbers and lists."""
+        result = {"sensor": self.words, "frequency_hz": self.frequency_hz.tolist(),
+                  "chosen": self.chosen, "reason": self.reason,
+                  "models": {name: {"parameters": self.fitted[name].parameters,
+                                    "values": dict(zip(self.fitted[name].fit.names,
+                                                       self.fitted[name].fit.values.tolist())),
+                                    "std": dict(zip(self.fitted[name].fit.names,
+                                                    self.fitted[name].fit.std.tolist())),
+                                    **judged.as_dict()}
+                             for name, judged in self.judged.items()}}
+        for key, swept in (("by_damping_order", self.by_damping_order),
+                           ("by_table_4", self.by_table_4)):
+            if swept:
+                result[key] = {"best": best(swept).as_dict(),
+                               "orders": [one.as_dict() for one in swept]}
+        return result
+
+
+def bags_of(folder):
+    """Paths of all bags, by what they are for.
+
+    Raises
+    ------
+    BagError
+        If one is missing.
+    """
+    folder = BAGS if folder is None else Path(folder)
+    paths = {name: (folder / f"paper_bench_{name}.mcap", folder / f"paper_bench_{name}_sines.mcap")
+             for name in SENSORS}
+    paths["one_sine"] = (folder / ONE_SINE,)
+    for group in paths.values():
+        for path in group:
+            if not path.exists():
+                raise BagError(f"{path}: no such bag; the study needs the paper_bench bags of the "
+                               "project's folder bags/: give their folder with --bags, or leave "
+                               "the study out with --quick")
+    return paths
+
+
+def judge_sensor(name, paths, progress=lambda: None):
+    """BenchResult of one sensor from its two bags.
+
+    Parameters
+    ----------
+    name : str
+        One of `SENSORS`.
+    paths : tuple of Path
+        The record to identify from, and that of sines.
+    progress : callable
+        Called after each fit of a sweep.
+    """
+    pair, sines = load_pair(paths[0]), Sines.of(load_pair(paths[1]))
+    fits = {key: fitted(key, structure, pair.reference[:, 0], pair.sensor[:, 0],
+                        pair.sampling_rate_hz, pair.valid, pair.lag_s)
+            for key, structure in STRUCTURES.items()}
+    found = identify(pair)
+    swept = [sweep(pairs, pair, sines, progress) if name in SWEPT else []
+             for pairs in (damping_orders(), table_4())]
+    return BenchResult(name, SENSORS[name], sines.points.frequency_hz, fits,
+                       {key: judge(fit, sines) for key, fit in fits.items()},
+                       found.structure, found.reason, *swept)
+
+
+def refusal(path):
+    """What ``identify`` says to the paper's own excitation; empty if it takes it."""
+    try:
+        identify(path)
+    except IdentificationError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,132 @@
+"""When a fractional model helps, over orders, noise levels and bandwidths."""
+
+import concurrent.futures
+import dataclasses
+import itertools
+import multiprocessing
+import signal
+
+import numpy as np
+
+from .candidates import AS_MANY, CLASSICAL, FRACTIONAL
+from .virtual import Case, outcome
+
+ORDERS = tuple(round(0.5 + 0.1 * i, 1) for i in range(11))
+NOISE_DB = (60.0, 40.0, 30.0, 20.0)
+# Below the resonance of 650 Hz, up to it, and past it.
+BANDS_HZ = (300.0, 600.0, 1500.0)
+SEEDS = 3
+_WORKERS = 2
+
+HELPS = "helps"
+SEEMS = "only seems to help"
+DOES_NOT = "does not help"
+OPEN = "undecided"
+# What each verdict means, for readers.
+VERDICTS = {
+    HELPS: "in every record it predicts better than each classical model, also the best one of as "
+           "many parameters",
+    SEEMS: "in every record it predicts better than the classical oscillator, but worse than the "
+           "best classical model of as many parameters: it takes the place of something else",
+    DOES_NOT: "in every record a classical model predicts better",
+    OPEN: "it depends on the noise of the record which predicts better",
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Cell:
+    """Records of one sensor at one noise level and bandwidth.
+
+    Attributes
+    ----------
+    case : Case
+        Of the first record.
+    outcomes : tuple of Outcome
+        One for each seed.
+    """
+
+    case: Case
+    outcomes: tuple
+
+    def errors(self, name):
+        """Errors of a candidate within the paper's band, one for each record."""
+        return np.array([one.inside[name] for one in self.outcomes])
+
+    @property
+    def best_classical(self):
+        """Smallest error of all classical models, one for each record, chosen afterwards."""
+        return np.nanmin([self.errors(name) for name in (CLASSICAL, *AS_MANY)], axis=0)
+
+    @property
+    def gains(self):
+        """Error of the best classical model over the fractional one's, one for each record."""
+        return self.best_classical / self.errors(FRACTIONAL)
+
+    @property
+    def gain(self):
+        """Geometric mean of the gains."""
+        return float(np.exp(np.mean(np.log(self.gains))))
+
+    @property
+    def verdict(self):
+        """One of `VERDICTS`."""
+        fractional, classical = self.errors(FRACTIONAL), self.errors(CLASSICAL)
+        rival = np.array([one.rival for one in self.outcomes])
+        if np.all(self.gains > 1):
+            return HELPS
+        if np.all(fractional < classical) and np.all(rival < fractional):
+            return SEEMS
+        return DOES_NOT if np.all(self.gains < 1) else OPEN
+
+    def as_dict(self):
+        """Plain numbers."""
+        return {"order": self.case.order, "lagging": self.case.lagging,
+                "noise_db": self.case.noise_db, "band_hz": self.case.band_hz,
+                "verdict": self.verdict, "gain": self.gain,
+                "gain_range": [float(self.gains.min()), float(self.gains.max())],
+                "error": {name: float(np.median(self.errors(name)))
+                          for name in self.outcomes[0].inside},
+                "noise_floor": float(np.median([one.floor for one in self.outcomes])),
+                "identified_order": [one.order for one in self.outcomes],
+                "identified_order_std": [one.order_std for one in self.outcomes],
+                "order_significant": [one.significant for one in self.outcomes]}
+
+
+def cases():
+    """All cases of the map, in groups of one cell."""
+    sensors = [(order, False) for order in ORDERS] + [(1.0, True)]
+    return [[Case(*sensor, noise, band, seed) for seed in range(SEEDS)]
+            for sensor, noise, band in itertools.product(sensors, NOISE_DB, BANDS_HZ)]
+
+
+def make_map(progress=lambda: None, groups=None):
+    """Fit and judge all candidates on the records of all cells, on two processes.
+
+    Parameters
+    ----------
+    progress : callable
+        Called after each cell.
+    groups : list of list of Case, optional
+        Default: `cases`.
+
+    Returns
+    -------
+    list of Cell
+    """
+    result = []
+    pool = concurrent.futures.ProcessPoolExecutor(
+        _WORKERS, multiprocessing.get_context("fork"), signal.signal,
+        (signal.SIGINT, signal.SIG_IGN))
+    try:
+        for cell in pool.map(cell_of, cases() if groups is None else groups):
+            result.append(cell)
+            progress()
+    finally:
+        # an interruption leaves at once, with what is not begun left undone
+        pool.shutdown(cancel_futures=True)
+    return result
+
+
+def cell_of(group):
+    """Cell of a group of cases."""
+    return Cell(group[0], tuple(outcome(case) for case in group))
