@@ -83,7 +83,7 @@ def _where(cells):
     missed = [cell for cell in true if cell.verdict != HELPS]
     where = "" if not missed else (
         f"; of the {len(missed)} combinations with a fractional sensor where it does not, "
-        f"{sum(cell.case.noise_db <= 30 for cell in missed)} have noise of 3 % or more and "
+        f"{sum(cell.case.noise_db <= 20 for cell in missed)} have noise of 10 % and "
         f"{sum(cell.case.band_hz < 600 for cell in missed)} an excitation that ends far below the "
         "resonance")
     wrong = sum(cell.case.order == 1 for cell in helping)

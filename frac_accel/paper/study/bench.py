@@ -6,7 +6,7 @@ from pathlib import Path
 from ...errors import BagError, IdentificationError
 from ...identification import identify
 from ...pair import load_pair
-from .candidates import STRUCTURES, fitted
+from .candidates import fit_all
 from .judge import Sines, judge
 from .sweep import best, damping_orders, sweep, table_4
 
@@ -86,7 +86,7 @@ def bags_of(folder):
     return paths
 
 
-def judge_sensor(name, paths, progress=lambda: None):
+def judge_sensor(name, paths, progress=lambda: None, orders=None):
     """BenchResult of one sensor from its two bags.
 
     Parameters
@@ -97,14 +97,16 @@ def judge_sensor(name, paths, progress=lambda: None):
         The record to identify from, and that of sines.
     progress : callable
         Called after each fit of a sweep.
+    orders : tuple of two lists of (float, float), optional
+        Orders to sweep; default: the paper's sweep and its Table 4, for the sensors in `SWEPT`.
     """
+    if orders is None:
+        orders = (damping_orders(), table_4()) if name in SWEPT else ([], [])
     pair, sines = load_pair(paths[0]), Sines.of(load_pair(paths[1]))
-    fits = {key: fitted(key, structure, pair.reference[:, 0], pair.sensor[:, 0],
-                        pair.sampling_rate_hz, pair.valid, pair.lag_s)
-            for key, structure in STRUCTURES.items()}
+    fits = fit_all(pair.reference[:, 0], pair.sensor[:, 0], pair.sampling_rate_hz, pair.valid,
+                   pair.lag_s)
     found = identify(pair)
-    swept = [sweep(pairs, pair, sines, progress) if name in SWEPT else []
-             for pairs in (damping_orders(), table_4())]
+    swept = [sweep(pairs, pair, sines, progress) for pairs in orders]
     return BenchResult(name, SENSORS[name], sines.points.frequency_hz, fits,
                        {key: judge(fit, sines) for key, fit in fits.items()},
                        found.structure, found.reason, *swept)

@@ -8,6 +8,7 @@ from ...core import FractionalTransferFunction, Oscillator
 from ...core.principal_sheet import fractional_root
 from ...effects.low_pass_lag import LowPassLag
 from ...effects.time_delay import TimeDelay
+from ...errors import IdentificationError
 from ...identification.output_error import Fit, fit_output_error
 from ...identification.structures import FractionalStructure, OscillatorStructure
 from ...model import SensorModel
@@ -132,6 +133,9 @@ def _with_one_more(mode):
 
 STRUCTURES = {CLASSICAL: OscillatorStructure(), FRACTIONAL: FractionalStructure(),
               LOW_PASS: LowPassStructure(), SLOPE: SlopeStructure()}
+# Values of the additional unknown to start from, by the sampling rate: order, corner and slope.
+_FROM_CLASSICAL = {FRACTIONAL: (lambda rate: 1.0,), LOW_PASS: (lambda rate: np.log(rate / 2),),
+                   SLOPE: (lambda rate: -0.3, lambda rate: 0.3)}
 # Classical models with as many parameters as the fractional one.
 AS_MANY = (LOW_PASS, SLOPE)
 
@@ -183,7 +187,41 @@ class Fitted:
         return response, np.stack([plain * shift, *by_own, -s * response])
 
 
-def fitted(name, structure, reference, sensor, rate, valid=None, lag_s=0.0):
-    """Fit a structure to a record; parameters as `fit_output_error`."""
-    return Fitted(name, structure,
-                  fit_output_error(structure, reference, sensor, rate, valid, lag_s))
+def fitted(name, structure, reference, sensor, rate, valid=None, lag_s=0.0, starts=(None,)):
+    """Fit a structure to a record; parameters as `fit_output_error`.
+
+    `starts` are further ones beside None, the structure's own grid; the best fit counts.
+    """
+    fits = []
+    for start in starts:
+        try:
+            fits.append(fit_output_error(structure, reference, sensor, rate, valid, lag_s, start))
+        except IdentificationError:
+            if len(starts) == 1:
+                raise
+    if not fits:
+        raise IdentificationError(f"{name}: no fit from any start")
+    return Fitted(name, structure, min(fits, key=lambda fit: fit.rmse))
+
+
+def fit_all(reference, sensor, rate, valid=None, lag_s=0.0):
+    """All `STRUCTURES` fitted to one record, all but the classical one also from its solution.
+
+    So no candidate loses by the search alone: each is at least as good as the classical one, which
+    they all contain.
+
+    Returns
+    -------
+    dict of str to Fitted
+        Without those that found no fit.
+    """
+    record = reference, sensor, rate, valid, lag_s
+    plain = fitted(CLASSICAL, STRUCTURES[CLASSICAL], *record)
+    result = {CLASSICAL: plain}
+    for name, values in _FROM_CLASSICAL.items():
+        near = [np.insert(plain.fit.unknowns, 2, value(rate)) for value in values]
+        try:
+            result[name] = fitted(name, STRUCTURES[name], *record, starts=(None, *near))
+        except IdentificationError:
+            continue
+    return result

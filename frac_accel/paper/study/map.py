@@ -7,15 +7,16 @@ import multiprocessing
 import signal
 
 import numpy as np
+from scipy.stats import t as student
 
 from .candidates import AS_MANY, CLASSICAL, FRACTIONAL
 from .virtual import Case, outcome
 
 ORDERS = tuple(round(0.5 + 0.1 * i, 1) for i in range(11))
-NOISE_DB = (60.0, 40.0, 30.0, 20.0)
+NOISE_DB = (60.0, 40.0, 20.0)
 # Below the resonance of 650 Hz, up to it, and past it.
 BANDS_HZ = (300.0, 600.0, 1500.0)
-SEEDS = 3
+SEEDS = 4
 _WORKERS = 2
 
 HELPS = "helps"
@@ -24,12 +25,11 @@ DOES_NOT = "does not help"
 OPEN = "undecided"
 # What each verdict means, for readers.
 VERDICTS = {
-    HELPS: "in every record it predicts better than each classical model, also the best one of as "
-           "many parameters",
-    SEEMS: "in every record it predicts better than the classical oscillator, but worse than the "
-           "best classical model of as many parameters: it takes the place of something else",
-    DOES_NOT: "in every record a classical model predicts better",
-    OPEN: "it depends on the noise of the record which predicts better",
+    HELPS: "it predicts better than each classical model, also the best one of as many parameters",
+    SEEMS: "it predicts better than the classical oscillator, but worse than the best classical "
+           "model of as many parameters: it takes the place of something else",
+    DOES_NOT: "a classical model predicts better",
+    OPEN: "the noise of the record decides which predicts better",
 }
 
 
@@ -49,8 +49,8 @@ class Cell:
     outcomes: tuple
 
     def errors(self, name):
-        """Errors of a candidate within the paper's band, one for each record."""
-        return np.array([one.inside[name] for one in self.outcomes])
+        """Errors of a candidate within the paper's band, one for each record; NaN without a fit."""
+        return np.array([one.inside.get(name, np.nan) for one in self.outcomes])
 
     @property
     def best_classical(self):
@@ -68,28 +68,42 @@ class Cell:
         return float(np.exp(np.mean(np.log(self.gains))))
 
     @property
+    def gain_interval(self):
+        """95 % interval of that mean, by Student's t on its logarithm."""
+        return _interval(self.gains)
+
+    @property
     def verdict(self):
-        """One of `VERDICTS`."""
-        fractional, classical = self.errors(FRACTIONAL), self.errors(CLASSICAL)
-        rival = np.array([one.rival for one in self.outcomes])
-        if np.all(self.gains > 1):
+        """One of `VERDICTS`, by the intervals."""
+        low, high = self.gain_interval
+        if low > 1:
             return HELPS
-        if np.all(fractional < classical) and np.all(rival < fractional):
+        fractional = self.errors(FRACTIONAL)
+        over_oscillator = _interval(self.errors(CLASSICAL) / fractional)
+        over_rival = _interval(np.array([one.rival for one in self.outcomes]) / fractional)
+        if over_oscillator[0] > 1 and over_rival[1] < 1:
             return SEEMS
-        return DOES_NOT if np.all(self.gains < 1) else OPEN
+        return DOES_NOT if high < 1 else OPEN
 
     def as_dict(self):
         """Plain numbers."""
         return {"order": self.case.order, "lagging": self.case.lagging,
                 "noise_db": self.case.noise_db, "band_hz": self.case.band_hz,
                 "verdict": self.verdict, "gain": self.gain,
-                "gain_range": [float(self.gains.min()), float(self.gains.max())],
+                "gain_interval": list(self.gain_interval),
                 "error": {name: float(np.median(self.errors(name)))
                           for name in self.outcomes[0].inside},
                 "noise_floor": float(np.median([one.floor for one in self.outcomes])),
                 "identified_order": [one.order for one in self.outcomes],
                 "identified_order_std": [one.order_std for one in self.outcomes],
                 "order_significant": [one.significant for one in self.outcomes]}
+
+
+def _interval(ratios):
+    """95 % interval of the geometric mean of positive values."""
+    logs = np.log(ratios)
+    half = student.ppf(0.975, len(logs) - 1) * logs.std(ddof=1) / np.sqrt(len(logs))
+    return float(np.exp(logs.mean() - half)), float(np.exp(logs.mean() + half))
 
 
 def cases():

@@ -13,11 +13,10 @@ import numpy as np
 from ...core import Oscillator
 from ...effects.low_pass_lag import LowPassLag
 from ...effects.time_delay import TimeDelay
-from ...errors import FracAccelError
 from ...model import SensorModel
 from ...simulation import simulate
 from .. import published
-from .candidates import AS_MANY, CLASSICAL, FRACTIONAL, STRUCTURES, fitted
+from .candidates import AS_MANY, FRACTIONAL, fit_all
 from .judge import rms
 
 # The bench's sensor and card, as in the recorded bags.
@@ -28,7 +27,7 @@ LOWEST_HZ = 10.0
 # Where models are judged: the paper's frequencies, and beyond.
 INSIDE_HZ = np.array(published.FREQUENCY_HZ)
 BEYOND_HZ = np.array([600.0, 700.0, 850.0, 1000.0, 1200.0])
-_SAMPLES, _LEAD = 4096, 512
+_SAMPLES, _LEAD = 2048, 512
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,7 +85,7 @@ class Outcome:
     case : Case
     inside, beyond : dict of str to float
         RMS relative error of each candidate's response, amplitude and phase together, at the
-        paper's frequencies and beyond. NaN where it could not be fitted.
+        paper's frequencies and beyond. Without those that could not be fitted.
     residual : dict of str to float
         RMS of each fit's residual over the output's standard deviation.
     floor : float
@@ -109,7 +108,7 @@ class Outcome:
 
         The best one afterwards: no rule of choice could do better for the classical side.
         """
-        return float(np.nanmin([self.inside[name] for name in AS_MANY]))
+        return min(self.inside[name] for name in AS_MANY if name in self.inside)
 
     @property
     def significant(self):
@@ -117,18 +116,24 @@ class Outcome:
         return abs(self.order - 1) > 3 * self.order_std
 
 
-def outcome(case):
-    """Fit all candidates to the record of a case, and compare them with the truth."""
-    reference, sensor = case.record()
+def outcome(case, record=None):
+    """Fit all candidates to the record of a case, and compare them with the truth.
+
+    Parameters
+    ----------
+    case : Case
+    record : tuple of two ndarray, optional
+        Reference and sensor instead of `Case.record`, such as those of another simulator.
+
+    Returns
+    -------
+    Outcome
+    """
+    reference, sensor = case.record() if record is None else record
     truth = case.truth()
     inside, beyond, residual = {}, {}, {}
     floor = order = order_std = float("nan")
-    for name, structure in STRUCTURES.items():
-        try:
-            found = fitted(name, structure, reference, sensor, published.SAMPLING_RATE_HZ)
-        except FracAccelError:
-            inside[name] = beyond[name] = residual[name] = float("nan")
-            continue
+    for name, found in fit_all(reference, sensor, published.SAMPLING_RATE_HZ).items():
         for errors, frequency in ((inside, INSIDE_HZ), (beyond, BEYOND_HZ)):
             errors[name] = rms(found.response(frequency) / truth.frequency_response(frequency) - 1)
         residual[name] = float(found.fit.rmse / sensor.std())
@@ -138,5 +143,3 @@ def outcome(case):
             floor = float(np.sqrt(np.trace(found.relative_covariance(INSIDE_HZ)) / len(INSIDE_HZ)))
     return Outcome(case, inside, beyond, residual, floor, order, order_std)
 
-
-__all__ = ["BEYOND_HZ", "CLASSICAL", "INSIDE_HZ", "Case", "Outcome", "outcome"]
