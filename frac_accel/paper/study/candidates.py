@@ -131,7 +131,14 @@ def _with_one_more(mode):
     return pole, None if slopes is None else np.r_[slopes, 0.0]
 
 
-STRUCTURES = {CLASSICAL: OscillatorStructure(), FRACTIONAL: FractionalStructure(),
+class NearFractionalStructure(FractionalStructure):
+    """Fractional sensor that is also searched for from the classical solution: fewer trials do."""
+
+    trials = 2
+    searches = 1
+
+
+STRUCTURES = {CLASSICAL: OscillatorStructure(), FRACTIONAL: NearFractionalStructure(),
               LOW_PASS: LowPassStructure(), SLOPE: SlopeStructure()}
 # Values of the additional unknown to start from, by the sampling rate: order, corner and slope.
 _FROM_CLASSICAL = {FRACTIONAL: (lambda rate: 1.0,), LOW_PASS: (lambda rate: np.log(rate / 2),),
