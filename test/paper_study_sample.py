@@ -17,9 +17,12 @@ def sample_study(bags):
     paths = bags_of(bags)
     bench = {name: judge_sensor(name, paths[name], orders=ORDERS) for name in SENSORS}
     rng = np.random.default_rng(8)
-    cells = [Cell(group[0], tuple(Outcome(
-        case, dict(zip((CLASSICAL, FRACTIONAL, LOW_PASS, SLOPE), rng.lognormal(-4, 1, 4))), {}, {},
-        0.01, case.order, 0.01) for case in group)) for group in cases()]
+    names = CLASSICAL, FRACTIONAL, LOW_PASS, SLOPE
+
+    def drawn(case):
+        errors = dict(zip(names, rng.lognormal(-4, 1, 4)))
+        return Outcome(case, errors, errors, dict.fromkeys(names, 0.01), 0.01, case.order, 0.01)
+    cells = [Cell(group[0], tuple(map(drawn, group))) for group in cases()]
     told = refusal(paths["one_sine"][0])
     return Study([path for group in paths.values() for path in group], bench, told, cells,
                  answer(bench, cells, told))

@@ -92,6 +92,13 @@ def test_model_column_of_table_1_is_out_of_reach(claims):
         assert cell < min(tried)
 
 
+def test_perfect_fit_excludes_table_1(claims):
+    claim = claims["perfect_fit_and_table_1"]
+    assert claim.status == "contradicted"
+    assert claim.numbers["as_printed"] == pytest.approx(209.06, abs=0.01)
+    assert claim.numbers["least"] > max(claim.numbers["cells"])
+
+
 def test_delay_of_g_is_no_sensors(claims):
     samples = claims["delay"].numbers["delay_samples"]
     phase = np.angle(signal.freqz(B, A, FREQUENCY, fs=1e4)[1])

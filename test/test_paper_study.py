@@ -172,7 +172,8 @@ def cell(fractional, classical, low_pass):
     """Cell with given errors, one per record."""
     case = Case(0.8, False, 40.0, 600.0, 0)
     return Cell(case, tuple(
-        Outcome(case, {CLASSICAL: c, FRACTIONAL: f, LOW_PASS: p, SLOPE: c}, {}, {}, 0.1, 0.8, 0.1)
+        Outcome(case, {CLASSICAL: c, FRACTIONAL: f, LOW_PASS: p, SLOPE: c}, {},
+                {CLASSICAL: 0.2, FRACTIONAL: 0.1}, 0.1, 0.8, 0.1)
         for f, c, p in zip(fractional, classical, low_pass)))
 
 

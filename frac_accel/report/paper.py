@@ -51,7 +51,7 @@ def _summary(section, result):
            "follows at the end, from recorded bags of a simulated bench."))
     claims = {claim.key: claim for claim in result.claims}
     constant = claims["constant_error"]
-    section.notice(f"The headline figure: {constant.status}. {constant.cause}")
+    section.notice(f"The constant error of 20.804 %: {constant.status}. {constant.cause}")
     if result.study is not None:
         section.text("When a fractional model helps, by the study below:")
         section.items(result.study.answer)

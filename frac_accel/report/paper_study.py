@@ -127,6 +127,21 @@ def _swept(section, study):
                   "Orders chosen by the smallest residual on the record that was fitted, and their "
                   "held-out errors: of the sweep, of the 64 combinations of the paper's Table 4, "
                   "and with the damping order as a free parameter.")
+    for result in swept.values():
+        _combinations(section, result)
+
+
+def _combinations(section, result):
+    """Table of the held-out errors over the paper's Table 4."""
+    by_orders = {(one.v1, one.v2): one for one in result.by_table_4}
+    first, second = (sorted({orders[i] for orders in by_orders}) for i in (0, 1))
+    rows = []
+    for v1 in first:
+        cells = [by_orders.get((v1, v2)) for v2 in second]
+        rows.append([f"{v1:g}", *("–" if one is None or one.judged is None else
+                                  f"{100 * one.judged.rms:.2g}" for one in cells)])
+    section.table(["damping order", *(f"inertia {v2:g}" for v2 in second)], rows,
+                  f"{sentence(result.words)} Held-out error [%] over the combinations of Table 4.")
 
 
 def _missing(swept):
@@ -154,7 +169,7 @@ def _map(section, study):
     cells = {(cell.case.order, cell.case.lagging, cell.case.noise_db, cell.case.band_hz): cell
              for cell in study.cells}
     for band in BANDS_HZ:
-        series = {f"noise −{noise:g} dB": np.array([cells[order, False, noise, band].gain
+        series = {_noise(noise): np.array([cells[order, False, noise, band].gain
                                                     for order in ORDERS]) for noise in NOISE_DB}
         series["no gain"] = np.ones(len(ORDERS))
         section.figure(
@@ -169,9 +184,13 @@ def _map(section, study):
                 low, high = cell.gain_interval
                 row.append(f"{cell.verdict} ({_factor(low)} to {_factor(high)})")
             rows.append(row)
-        section.table(["sensor's order", *(f"noise −{noise:g} dB" for noise in NOISE_DB)], rows,
+        section.table(["sensor's order", *map(_noise, NOISE_DB)], rows,
                       "Verdicts, and 95 % intervals of the gain's geometric mean over the records; "
                       f"excitation up to {band:g} Hz.")
+
+
+def _noise(level_db):
+    return f"noise {100 * 10**(-level_db / 20):g} %"
 
 
 def _factor(value):

@@ -115,6 +115,26 @@ def model_column():
          "impossible_at_hz": impossible})
 
 
+def fit_and_table_1():
+    """Figures 5 and 7 beside Table 1 at 300 Hz."""
+    response = tables.responses(models.identified())[_AT]
+    frequency = published.IDENTIFIED_AT_HZ
+    as_printed = median_error_percent(response, frequency)
+    least = least_error_percent(np.angle(response), frequency)
+    cells = float(_SENSOR[_AT]), float(_MODEL[_AT])
+    return Claim(
+        "perfect_fit_and_table_1", "section 2, Figures 5 and 7, and Table 1",
+        "At 300 Hz sensor and model have the same amplitude and phase, and their errors are "
+        "29.1945 and 29.5564 %.",
+        CONTRADICTED if least > min(cells) else CONFIRMED,
+        "Both cannot be true of the printed G(z): if the sensor's signal were G(z)'s, its error "
+        "would be G(z)'s as well. Which of the three is not what it is said to be cannot be told.",
+        f"The error of G(z) at 300 Hz is {as_printed:.2f} %; with any other amplitude, and any "
+        f"phase of the first sample, its phase alone gives at least {least:.2f} %. Same signals "
+        f"would have the same error; the cells differ by {cells[1] - cells[0]:.4f} points.",
+        {"as_printed": as_printed, "least": least, "cells": cells})
+
+
 def other_frequencies():
     """Errors away from the identification frequency."""
     lower = [int(f) for f, error in zip(_FREQUENCY, _MODEL) if error < _MODEL[_AT]]
@@ -231,6 +251,6 @@ def constant_error():
         {"computed": computed.tolist(), "worst": worst, "from_one_coefficient": coefficient})
 
 
-CLAIMS = (peaks, measure, larger_by, sensor_column, model_column, other_frequencies,
-          growing_difference, baselines, constant_error, advantage_with_distance,
+CLAIMS = (peaks, measure, larger_by, sensor_column, model_column, fit_and_table_1,
+          other_frequencies, growing_difference, baselines, constant_error, advantage_with_distance,
           percent_or_points, nearer_to_the_sensor)

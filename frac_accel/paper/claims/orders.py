@@ -213,7 +213,7 @@ def conclusion():
         "No model of the paper has its orders determined from data, and all orders near 1 and 2 "
         "give the same figures. Whether a sensor's damping is fractional is a question to a "
         "sensor's data: see the study.",
-        "See `no_difference_between_orders` and `more_accurate_with_integer_orders`.")
+        "What was computed is with the claims on combinations of orders and on integer orders.")
 
 
 CLAIMS = (magnitude, phase, swept_orders, closest_order, unstable, domain_correct,

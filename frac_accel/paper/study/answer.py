@@ -5,6 +5,7 @@ import numpy as np
 from ..claims.orders import order_combinations
 from .candidates import AS_MANY, CLASSICAL, FRACTIONAL
 from .map import HELPS, SEEMS
+from .virtual import NATURAL_HZ
 
 # Probability below which an error is more than its uncertainty.
 _SIGNIFICANT = 0.01
@@ -23,7 +24,7 @@ def answer(bench, cells, refusal):
     -------
     list of str
     """
-    return [_fractional(bench["fractional"]), _classical(bench["classical"]),
+    return [_fractional(bench["fractional"]), _classical(bench["classical"], cells),
             _where(cells), _seems(bench["lagging"], cells), _paper(refusal)]
 
 
@@ -59,7 +60,7 @@ def _fractional(result):
             f"{_factor(ratio)} times as much.")
 
 
-def _classical(result):
+def _classical(result, cells):
     own, plain = result.judged[FRACTIONAL], result.judged[CLASSICAL]
     fit = result.fitted[FRACTIONAL].fit
     order, std = fit["damping_order"], fit.std[fit.names.index("damping_order")]
@@ -69,7 +70,19 @@ def _classical(result):
     return (f"Where the damping is classical it {verdict}: the order is found to be {order:.4f} ± "
             f"{std:.1g}, the model that `identify` selects {chosen}, and the held-out errors are "
             f"{_percent(own)} with a free order and {_percent(plain)} without"
-            + (", both at the noise floor." if same else "."))
+            + (", both at the noise floor" if same else "") + _illusion(cells) + ".")
+
+
+def _illusion(cells):
+    """How often the free order fits a classical sensor's record better, and predicts worse."""
+    outcomes = [one for cell in cells if cell.case.order == 1 and not cell.case.lagging
+                for one in cell.outcomes]
+    if not outcomes:
+        return ""
+    fits = [one.residual[FRACTIONAL] < one.residual[CLASSICAL] for one in outcomes]
+    worse = [one.inside[FRACTIONAL] > one.inside[CLASSICAL] for one in outcomes]
+    return (f"; in the map it leaves a smaller residual in {sum(fits)} of {len(fits)} records of "
+            f"classical sensors, and predicts worse in {sum(worse)} of them")
 
 
 def _where(cells):
@@ -80,17 +93,25 @@ def _where(cells):
                 "fractional model helps nowhere.")
     gains = [cell.gain for cell in helping]
     true = [cell for cell in proper if cell.case.order != 1]
-    missed = [cell for cell in true if cell.verdict != HELPS]
-    where = "" if not missed else (
-        f"; of the {len(missed)} combinations with a fractional sensor where it does not, "
-        f"{sum(cell.case.noise_db <= 20 for cell in missed)} have noise of 10 % and "
-        f"{sum(cell.case.band_hz < 600 for cell in missed)} an excitation that ends far below the "
-        "resonance")
     wrong = sum(cell.case.order == 1 for cell in helping)
+    by_noise = _shares(true, lambda cell: cell.case.noise_db,
+                       lambda level: f"with noise of {100 * 10**(-level / 20):g} %")
+    by_band = _shares(true, lambda cell: cell.case.band_hz,
+                      lambda band: f"excited up to {band:g} Hz")
     return (f"Over the map it helps in {len(helping) - wrong} of {len(true)} combinations with a "
-            f"fractional sensor, by a factor of {_factor(np.median(gains))} (median; "
-            f"{_factor(min(gains))} to {_factor(max(gains))}), and in {wrong} of "
-            f"{len(proper) - len(true)} with a classical one{where}.")
+            f"fractional sensor ({by_noise}; {by_band}, the resonance being at {NATURAL_HZ:g} Hz), "
+            f"by a factor of {_factor(np.median(gains))} (median; {_factor(min(gains))} to "
+            f"{_factor(max(gains))}), and in {wrong} of {len(proper) - len(true)} with a classical "
+            "one.")
+
+
+def _shares(cells, key, words):
+    """In how many cells of each kind it helps."""
+    counts = {}
+    for cell in cells:
+        helped, of = counts.get(key(cell), (0, 0))
+        counts[key(cell)] = helped + (cell.verdict == HELPS), of + 1
+    return ", ".join(f"{helped} of {of} {words(value)}" for value, (helped, of) in counts.items())
 
 
 def _seems(result, cells):

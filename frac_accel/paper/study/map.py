@@ -29,7 +29,7 @@ VERDICTS = {
     SEEMS: "it predicts better than the classical oscillator, but worse than the best classical "
            "model of as many parameters: it takes the place of something else",
     DOES_NOT: "a classical model predicts better",
-    OPEN: "the noise of the record decides which predicts better",
+    OPEN: "the noise of the record decides which predicts better: the intervals include 1",
 }
 
 
@@ -93,6 +93,9 @@ class Cell:
                 "gain_interval": list(self.gain_interval),
                 "error": {name: float(np.median(self.errors(name)))
                           for name in self.outcomes[0].inside},
+                "error_beyond": {name: float(np.median([one.beyond.get(name, np.nan)
+                                                        for one in self.outcomes]))
+                                 for name in self.outcomes[0].beyond},
                 "noise_floor": float(np.median([one.floor for one in self.outcomes])),
                 "identified_order": [one.order for one in self.outcomes],
                 "identified_order_std": [one.order_std for one in self.outcomes],
