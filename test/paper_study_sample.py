@@ -4,7 +4,7 @@ import numpy as np
 
 from frac_accel.paper.study import Study
 from frac_accel.paper.study.answer import answer
-from frac_accel.paper.study.bench import SENSORS, bags_of, judge_sensor, refusal
+from frac_accel.paper.study.bench import SENSORS, bags_of, diagnosed, judge_sensor, refusal
 from frac_accel.paper.study.candidates import CLASSICAL, FRACTIONAL, LOW_PASS, SLOPE
 from frac_accel.paper.study.map import Cell, cases
 from frac_accel.paper.study.virtual import Outcome
@@ -24,5 +24,5 @@ def sample_study(bags):
         return Outcome(case, errors, errors, dict.fromkeys(names, 0.01), 0.01, case.order, 0.01)
     cells = [Cell(group[0], tuple(map(drawn, group))) for group in cases()]
     told = refusal(paths["one_sine"][0])
-    return Study([path for group in paths.values() for path in group], bench, told, cells,
-                 answer(bench, cells, told))
+    return Study([path for group in paths.values() for path in group], bench, told,
+                 {"lagging": diagnosed(paths["lagging"][0])}, cells, answer(bench, cells, told))

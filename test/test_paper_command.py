@@ -56,6 +56,10 @@ def test_full_result_can_be_written(tmp_path):
     told = json.loads(json.dumps(result.as_dict(), allow_nan=True))["study"]
     assert len(told["answer"]) == 5
     assert len(told["map"]) == len(study.cells)
+    causes = {finding["cause"]: finding for finding in told["diagnoses"]["lagging"]["findings"]}
+    corner = causes["low_pass_lag"]["parameters"]["corner_hz"]
+    assert corner["value"] == pytest.approx(2500, abs=4 * corner["std"])
+    assert "fractional_damping" not in causes
     fractional = told["bench"]["fractional"]["models"]["fractional"]
     assert fractional["values"]["damping_order"] == pytest.approx(0.6, abs=0.01)
     assert len(fractional["amplitude_error_percent"]) == 10

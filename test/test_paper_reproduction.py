@@ -51,6 +51,28 @@ def test_metric_is_the_gain_at_zero_phase_and_singular_with_phase():
     assert np.nanmax(error) > 10 * np.nanmedian(error)
 
 
+def test_settled_sines_are_those_of_a_simulation():
+    """G(z) stepped sample by sample from rest, its beginning left out."""
+    response = signal.freqz(B, A, FREQUENCY, fs=1e4)[1]
+    for value, frequency in zip(response, FREQUENCY):
+        reference = np.sin(2 * np.pi * frequency * np.arange(11_000) / 1e4)
+        output = signal.lfilter(B, A, reference)
+        error = relative_error_percent(reference[1000:], output[1000:])
+        assert np.nanmedian(error) == pytest.approx(median_error_percent(value, frequency))
+
+
+def test_unstable_model_grows_from_rest(claims):
+    """Partial fractions against the state equation of the same system."""
+    numbers = claims["usable_model"].numbers
+    system = signal.StateSpace(*signal.tf2ss(B, A))
+    time_s = np.arange(10_000) / 1e4
+    reference = np.sin(2 * np.pi * 100 * time_s)
+    _, output, _ = signal.lsim(system, reference, time_s, interp=True)
+    settled = np.nanmedian(relative_error_percent(reference, output))
+    assert numbers["from_rest_percent"][0] == pytest.approx(settled, abs=0.03)
+    assert numbers["from_rest_percent"][2] > 3 * settled
+
+
 def test_substituted_model_is_a_constant_gain(claims):
     response = tables.responses(models.substituted())
     assert np.allclose(response, np.polyval(B, 2j * np.pi * FREQUENCY)

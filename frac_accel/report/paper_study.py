@@ -8,6 +8,7 @@ from ..paper.study.candidates import CLASSICAL, FRACTIONAL
 from ..paper.study.map import BANDS_HZ, NOISE_DB, ORDERS, SEEDS, VERDICTS
 from ..paper.study.sweep import best
 from . import figures
+from .quantity import rounded
 from .signals import sentence
 
 
@@ -45,6 +46,18 @@ def _bench(section, study):
                   [[result.words, result.chosen, result.reason] for result in
                    study.bench.values()],
                   "What the package selects by itself from the noise record.")
+    rows = []
+    for name, found in study.diagnoses.items():
+        causes = [f"{finding['cause']}: " + ", ".join(
+            f"{parameter} {' ± '.join(filter(None, rounded(entry['value'], entry['std'])))} "
+            f"{entry['unit']}".removesuffix(" 1")
+            for parameter, entry in finding["parameters"].items())
+            for finding in found["findings"]]
+        rows.append([study.bench[name].words, found["verdict"], "; ".join(causes) or "none"])
+    section.table(["sensor", "verdict", "causes"], rows,
+                  "What `diagnose` names from the same records, starting from a classical model "
+                  "without a delay: the cause behind the low-pass, where a fractional damping "
+                  "would stand in for it.")
     section.text("The paper's own excitation on the same bench, a sine of 300 Hz, is refused: "
                  f"{study.refusal.split(';')[0]}." if study.refusal else
                  "The paper's own excitation, a sine of 300 Hz, is not refused.")

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...errors import ModelError
 from .. import curves, models, published, tables
+from ..metric import relative_error_percent, sampled_sines
 from .claim import (
     ARTEFACT,
     CONFIRMED,
@@ -84,6 +85,8 @@ def unstable():
     except ModelError as error:
         refusal = str(error)
     slowest = float(np.log(2) / poles.real.max())
+    durations = (1.0, 10.0, 20.0)
+    grown = [_from_rest_percent(duration) for duration in durations]
     return Claim(
         "usable_model", "sections 4 and 6",
         "The fractional model describes the sensor.",
@@ -91,8 +94,23 @@ def unstable():
         "A1 is negative: as a continuous system the model is unstable. A frequency response can "
         "be drawn all the same; a simulation grows without bound.",
         f"Poles at {listed(poles.real, 4)} per second in the right half-plane; the motion doubles "
-        f"every {slowest:.2f} s. The package refuses it: \"{refusal}\".",
-        {"poles_per_s": poles.real.tolist()})
+        f"every {slowest:.2f} s. From rest, the error for a sine of 100 Hz is "
+        f"{listed(grown)} % over the first {listed(durations, 0)} s. The package refuses it: "
+        f"\"{refusal}\".",
+        {"poles_per_s": poles.real.tolist(), "from_rest_s": list(durations),
+         "from_rest_percent": grown})
+
+
+def _from_rest_percent(duration_s, frequency_hz=100.0):
+    """The paper's measure of the substituted model that starts from rest, by partial fractions."""
+    omega = 2 * np.pi * frequency_hz
+    settled = models.substituted().transfer_function(np.array([1j * omega]))[0]
+    time_s, reference, output = sampled_sines(settled, frequency_hz, duration_s=duration_s)
+    for pole in np.roots(published.G_DENOMINATOR):
+        residue = (np.polyval(published.G_NUMERATOR, pole) * omega / (pole**2 + omega**2)
+                   / np.polyval(np.polyder(published.G_DENOMINATOR), pole))
+        output = output + residue * np.exp(pole * time_s)
+    return float(np.nanmedian(relative_error_percent(reference, output)))
 
 
 def swept_orders():

@@ -10,8 +10,8 @@ import dataclasses
 
 from ...identification.fit_validation import p_words
 from .answer import answer
-from .bench import SENSORS, SWEPT, bags_of, judge_sensor, refusal
-from .map import VERDICTS, cases, make_map
+from .bench import SENSORS, SWEPT, bags_of, diagnosed, judge_sensor, refusal
+from .map import VERDICTS, cases, make_map, workers
 from .sweep import damping_orders, table_4
 
 __all__ = ["VERDICTS", "Study", "run_study"]
@@ -27,6 +27,8 @@ class Study:
     bench : dict of str to BenchResult
     refusal : str
         What ``identify`` says to a sine of 300 Hz.
+    diagnoses : dict of str to dict
+        What ``diagnose`` says of each sensor's noise record, as in its result file.
     cells : list of Cell
         The map.
     answer : list of str
@@ -36,6 +38,7 @@ class Study:
     bags: list
     bench: dict
     refusal: str
+    diagnoses: dict
     cells: list
     answer: list
 
@@ -52,6 +55,9 @@ class Study:
                     f"floor {100 * judged.floor:.4f} %, {p_words(judged.p_value)}")
         counts = {verdict: sum(cell.verdict == verdict for cell in self.cells)
                   for verdict in VERDICTS}
+        for name, found in self.diagnoses.items():
+            lines.append(f"diagnose, {name} sensor: {found['verdict']}" + "".join(
+                f"; {finding['cause']}" for finding in found["findings"]))
         lines.append(f"map of {len(self.cells)} cells: " + ", ".join(
             f"{verdict} in {count}" for verdict, count in counts.items()))
         return lines + self.answer
@@ -60,7 +66,8 @@ class Study:
         """Plain numbers and lists."""
         return {"bags": [path.name for path in self.bags],
                 "bench": {name: result.as_dict() for name, result in self.bench.items()},
-                "one_sine": self.refusal, "map": [cell.as_dict() for cell in self.cells],
+                "one_sine": self.refusal, "diagnoses": self.diagnoses,
+                "map": [cell.as_dict() for cell in self.cells],
                 "answer": self.answer}
 
 
@@ -93,11 +100,14 @@ def run_study(bags=None, progress=lambda words, share: None):
         done += steps
         progress(words, min(done / total, 1.0))
     bench = {}
-    for name in SENSORS:
-        words = f"bench: {name} sensor"
-        progress(words, done / total)
-        bench[name] = judge_sensor(name, paths[name], lambda words=words: advance(words, 1))
-    cells = make_map(lambda: advance("map of virtual records", 10))
-    told = refusal(paths["one_sine"][0])
-    return Study([path for group in paths.values() for path in group], bench, told, cells,
-                 answer(bench, cells, told))
+    with workers() as pool:
+        named = {name: pool.submit(diagnosed, paths[name][0]) for name in SENSORS}
+        for name in SENSORS:
+            words = f"bench: {name} sensor"
+            progress(words, done / total)
+            bench[name] = judge_sensor(name, paths[name], lambda words=words: advance(words, 1))
+        told = refusal(paths["one_sine"][0])
+        cells = make_map(pool, lambda: advance("map of virtual records", 10))
+        diagnoses = {name: future.result() for name, future in named.items()}
+    return Study([path for group in paths.values() for path in group], bench, told, diagnoses,
+                 cells, answer(bench, cells, told))

@@ -3,6 +3,7 @@
 import dataclasses
 from pathlib import Path
 
+from ...diagnosis import diagnose
 from ...errors import BagError, IdentificationError
 from ...identification import identify
 from ...pair import load_pair
@@ -110,6 +111,11 @@ def judge_sensor(name, paths, progress=lambda: None, orders=None):
     return BenchResult(name, SENSORS[name], sines.points.frequency_hz, fits,
                        {key: judge(fit, sines) for key, fit in fits.items()},
                        found.structure, found.reason, *swept)
+
+
+def diagnosed(path):
+    """What ``diagnose`` says of a record by itself, as in its result file."""
+    return diagnose(path).as_dict()
 
 
 def refusal(path):

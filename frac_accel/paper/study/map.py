@@ -1,6 +1,7 @@
 """When a fractional model helps, over orders, noise levels and bandwidths."""
 
 import concurrent.futures
+import contextlib
 import dataclasses
 import itertools
 import multiprocessing
@@ -116,11 +117,25 @@ def cases():
             for sensor, noise, band in itertools.product(sensors, NOISE_DB, BANDS_HZ)]
 
 
-def make_map(progress=lambda: None, groups=None):
-    """Fit and judge all candidates on the records of all cells, on two processes.
+@contextlib.contextmanager
+def workers():
+    """Two processes that an interruption ends at once."""
+    pool = concurrent.futures.ProcessPoolExecutor(
+        _WORKERS, multiprocessing.get_context("fork"), signal.signal,
+        (signal.SIGINT, signal.SIG_IGN))
+    try:
+        yield pool
+    finally:
+        # what is not begun is left undone
+        pool.shutdown(cancel_futures=True)
+
+
+def make_map(pool, progress=lambda: None, groups=None):
+    """Fit and judge all candidates on the records of all cells.
 
     Parameters
     ----------
+    pool : concurrent.futures.Executor
     progress : callable
         Called after each cell.
     groups : list of list of Case, optional
@@ -131,16 +146,9 @@ def make_map(progress=lambda: None, groups=None):
     list of Cell
     """
     result = []
-    pool = concurrent.futures.ProcessPoolExecutor(
-        _WORKERS, multiprocessing.get_context("fork"), signal.signal,
-        (signal.SIGINT, signal.SIG_IGN))
-    try:
-        for cell in pool.map(cell_of, cases() if groups is None else groups):
-            result.append(cell)
-            progress()
-    finally:
-        # an interruption leaves at once, with what is not begun left undone
-        pool.shutdown(cancel_futures=True)
+    for cell in pool.map(cell_of, cases() if groups is None else groups):
+        result.append(cell)
+        progress()
     return result
 
 
