@@ -9,7 +9,8 @@ import pytest
 import rig
 
 from frac_accel import SensorModel
-from frac_accel.errors import BagError
+from frac_accel.errors import BagError, IdentificationError
+from frac_accel.pair import load_pair
 from frac_accel.paper.study.answer import answer
 from frac_accel.paper.study.bench import SENSORS, bags_of, judge_sensor, refusal
 from frac_accel.paper.study.candidates import (
@@ -84,6 +85,11 @@ def test_the_papers_excitation_is_refused():
 def test_missing_bags_are_named(tmp_path):
     with pytest.raises(BagError, match="paper_bench_classical.mcap.*--quick"):
         bags_of(tmp_path)
+
+
+def test_other_records_are_no_judges():
+    with pytest.raises(IdentificationError, match="expected a stepped sine"):
+        Sines.of(load_pair(bags_of(BAGS)["classical"][0]))
 
 
 def test_bags_are_small_and_hold_the_bench(bench):

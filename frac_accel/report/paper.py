@@ -115,7 +115,7 @@ def _tables(section, result):
         section.table(["", "", *heads], rows, f"The paper's Table {number}: {content.title}.")
         section.items(f"{column.name.replace('_percent', '').replace('_', ' ')}: {column.status}. "
                       f"{sentence(column.remark)}" for column in content.columns
-                      if column.remark != "given")
+                      if column.remark)
 
 
 def _figures(section, result):

@@ -68,7 +68,7 @@ def _classical(result, cells):
     verdict = "does not help" if same or own.rms >= plain.rms else "helps"
     chosen = "is classical" if result.chosen == "oscillator" else f"is {result.chosen}"
     return (f"Where the damping is classical it {verdict}: the order is found to be {order:.4f} ± "
-            f"{std:.1g}, the model that `identify` selects {chosen}, and the held-out errors are "
+            f"{std:.1g}, the model that identify selects {chosen}, and the held-out errors are "
             f"{_percent(own)} with a free order and {_percent(plain)} without"
             + (", both at the noise floor" if same else "") + _illusion(cells) + ".")
 

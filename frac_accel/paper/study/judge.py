@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 from scipy.stats import chi2
 
+from ...errors import IdentificationError
 from ...identification import response_points
 from ...identification.points import ResponsePoints
 from ...simulation import simulate
@@ -40,8 +41,17 @@ class Sines:
 
     @classmethod
     def of(cls, pair):
-        """Sines of the x axis of a measured pair."""
+        """Sines of the x axis of a measured pair.
+
+        Raises
+        ------
+        IdentificationError
+            If it holds anything else.
+        """
         points = response_points(pair)
+        if points.excitation.kind != "stepped_sine":
+            raise IdentificationError("the record to judge on holds "
+                                      f"{points.excitation.words}, expected a stepped sine")
         rate = pair.sampling_rate_hz
         parts = tuple(slice(round(segment["start_s"] * rate), round(segment["stop_s"] * rate))
                       for segment in points.segments)
