@@ -78,6 +78,20 @@ def test_fractional_model_only_stands_in_for_a_low_pass(bench):
     assert result.fitted[LOW_PASS].fit["corner_hz"] == pytest.approx(2500, rel=0.01)
 
 
+@pytest.mark.parametrize("name", SENSORS)
+def test_substitution_gives_a_constant_for_any_sensor(bench, name):
+    """The paper's flat error is no property of its sensor; converted properly, G(z) is right."""
+    found = bench[name].sampled
+    error = np.array(found["substituted_error_percent"])
+    assert np.ptp(error) < 0.05
+    assert error == pytest.approx(100 * abs(1 - found["leading_coefficient"]), abs=0.02)
+    assert found["held_out_rms"] < 0.01
+    if name != "fractional":
+        pole = found["poles"][0]
+        assert pole["natural_frequency_hz"]["value"] == pytest.approx(650, rel=1e-3)
+        assert pole["damping_ratio"]["value"] == pytest.approx(0.12, rel=1e-2)
+
+
 def test_the_papers_excitation_is_refused():
     assert "persistently exciting of order 2" in refusal(bags_of(BAGS)["one_sine"][0])
 

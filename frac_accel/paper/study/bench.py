@@ -3,12 +3,16 @@
 import dataclasses
 from pathlib import Path
 
+import numpy as np
+
 from ...diagnosis import diagnose
 from ...errors import BagError, IdentificationError
 from ...identification import identify
 from ...pair import load_pair
+from .. import published
+from ..tables import errors_percent
 from .candidates import fit_all
-from .judge import Sines, judge
+from .judge import Sines, judge, rms
 from .sweep import best, damping_orders, sweep, table_4
 
 BAGS = Path(__file__).resolve().parents[3] / "bags"
@@ -33,6 +37,8 @@ class BenchResult:
     judged : dict of str to Judged
     chosen, reason : str
         Structure that ``identify`` chooses, and why.
+    sampled : dict
+        The transfer function in z, and what becomes of it in s: see `sampled_model`.
     by_damping_order, by_table_4 : list of SweptOrder
         Empty where the orders are not swept.
     """
@@ -44,13 +50,14 @@ class BenchResult:
     judged: dict
     chosen: str
     reason: str
+    sampled: dict
     by_damping_order: list
     by_table_4: list
 
     def as_dict(self):
         """Plain numbers and lists."""
         result = {"sensor": self.words, "frequency_hz": self.frequency_hz.tolist(),
-                  "chosen": self.chosen, "reason": self.reason,
+                  "chosen": self.chosen, "reason": self.reason, "sampled_model": self.sampled,
                   "models": {name: {"parameters": self.fitted[name].parameters,
                                     "values": dict(zip(self.fitted[name].fit.names,
                                                        self.fitted[name].fit.values.tolist())),
@@ -110,7 +117,30 @@ def judge_sensor(name, paths, progress=lambda: None, orders=None):
     swept = [sweep(pairs, pair, sines, progress) for pairs in orders]
     return BenchResult(name, SENSORS[name], sines.points.frequency_hz, fits,
                        {key: judge(fit, sines) for key, fit in fits.items()},
-                       found.structure, found.reason, *swept)
+                       found.structure, found.reason, sampled_model(pair, sines), *swept)
+
+
+def sampled_model(pair, sines):
+    """A transfer function in z, with its poles in s, and with its numbers put into s.
+
+    Returns
+    -------
+    dict
+        ``held_out_rms``: relative error of the model in z in the paper's band; ``poles``: natural
+        frequencies and damping ratios by s = rate ln z; ``leading_coefficient`` of its numerator;
+        ``substituted_error_percent``: the paper's measure, against the reference, of the
+        differential equation with the coefficients of z, as the paper has it.
+    """
+    model = identify(pair, structure="arx").model
+    core = model.axis("x").core
+    frequency = sines.points.frequency_hz
+    error = model.frequency_response(frequency) / sines.points.response - 1
+    s = 2j * np.pi * np.array(published.FREQUENCY_HZ)
+    substituted = np.polyval(core.numerator, s) / np.polyval(core.denominator, s)
+    return {"held_out_rms": rms(error[sines.inside]),
+            "poles": model.metadata["continuous_equivalent"]["poles"],
+            "leading_coefficient": core.numerator[0] / core.denominator[0],
+            "substituted_error_percent": list(errors_percent(substituted))}
 
 
 def diagnosed(path):
