@@ -56,23 +56,21 @@ def _bench(section, study):
         rows.append([study.bench[name].words, found["verdict"], "; ".join(causes) or "none"])
     section.table(["sensor", "verdict", "causes"], rows,
                   "What diagnose names from the same records, starting from a classical model "
-                  "without a delay. True are the delay of 7e-05 s in all three, the order of 0.6 "
+                  "without a delay. True are the delay of 70 µs in all three, the order of 0.6 "
                   "in the second, and the corner of 2500 Hz in the third; none has an offset.")
     rows = []
     for result in study.bench.values():
         found = result.sampled
-        poles = ["{} Hz, {}".format(*(" ± ".join(filter(None, rounded(
-            pole[key]["value"], pole[key]["std"])))
-            for key in ("natural_frequency_hz", "damping_ratio"))) for pole in found["poles"]]
-        rows.append([result.words, f"{100 * found['held_out_rms']:.3g}", "; ".join(poles),
-                     f"{found['leading_coefficient']:.3g}",
-                     ", ".join(f"{value:.3f}" for value in found["substituted_error_percent"])])
-    section.table(["sensor", "error in z [%]", "poles in s: frequency, damping", "b", "error [%]"],
-                  rows,
+        poles = [f"{pole['natural_frequency_hz']['value']:.2f} Hz, "
+                 f"{pole['damping_ratio']['value']:.4f}" for pole in found["poles"]]
+        flat = found["substituted_error_percent"]
+        rows.append([result.name, f"{100 * found['held_out_rms']:.2g}", "; ".join(poles),
+                     f"{found['leading_coefficient']:.3g}", f"{min(flat):.4f} to {max(flat):.4f}"])
+    section.table(["sensor", "error [%]", "poles in s", "b", "substituted: error [%]"], rows,
                   "A transfer function in z from the same records: its held-out error, its poles "
-                  "converted by s = rate · ln z, its leading numerator coefficient b, and the "
-                  "paper's measure at 100 to 500 Hz if its coefficients are put into an equation "
-                  "in s: 100 |1 − b| for any sensor.")
+                  "(natural frequency and damping ratio) by s = rate · ln z, its leading "
+                  "numerator coefficient b, and the paper's measure at 100 to 500 Hz if its "
+                  "coefficients are put into an equation in s: 100 |1 − b| for any sensor.")
     section.text("The paper's own excitation on the same bench, a sine of 300 Hz, is refused: "
                  f"{study.refusal.split(';')[0]}." if study.refusal else
                  "The paper's own excitation, a sine of 300 Hz, is not refused.")
