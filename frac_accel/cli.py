@@ -16,6 +16,7 @@ VERBS = {
     "validate": "error metrics of a model and of its correction",
     "correct": "raw acceleration -> corrected acceleration",
     "diagnose": "what a simulation gets wrong, the cause, the extension, the gain",
+    "paper": "the seed paper's tables and figures again, and the audit of its claims",
 }
 
 

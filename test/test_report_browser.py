@@ -8,9 +8,12 @@ from types import SimpleNamespace
 import browser
 import numpy as np
 import pytest
+from paper_study_sample import sample_study
 
 from frac_accel.cli import main
+from frac_accel.paper import PaperResult, reproduce
 from frac_accel.report import Page, figures
+from frac_accel.report.paper import paper_page
 
 BUTTONS = {"Download plot", "Download plot as a PNG", "Download plot as a png", "Zoom", "Pan",
            "Zoom in", "Zoom out", "Reset axes"}
@@ -100,6 +103,16 @@ def test_report_of_a_diagnosis_is_drawn(tmp_path):
     dom, console = browser.open_page(page)
     assert not console
     assert len(require_drawn(dom)) == 5
+
+
+def test_report_of_the_paper_is_drawn(tmp_path):
+    quick = reproduce(study=False)
+    study = sample_study(browser.ROOT / "bags")
+    page = tmp_path / "r.html"
+    paper_page(PaperResult(quick.tables, quick.figures, quick.claims, study)).write(page)
+    dom, console = browser.open_page(page)
+    assert not console
+    assert len(require_drawn(dom)) == 14
 
 
 def test_a_broken_page_is_noticed(tmp_path):

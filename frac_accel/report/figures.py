@@ -82,6 +82,37 @@ def bode(curve, points=None, modelled=None, unit="output units per m/s²"):
     return figure
 
 
+def bode_curves(frequency_hz, curves, colours=SERIES):
+    """Magnitude in decibels and phase of several responses over frequency.
+
+    Parameters
+    ----------
+    frequency_hz : ndarray, shape (m,)
+    curves : dict of str to tuple of two ndarray, shape (m,)
+        Magnitude [dB] and phase [degree].
+    colours : sequence of str
+        At least as many as there are curves.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    figure = _rows(2, 520, "frequency [Hz]", ["magnitude [dB]", "phase [°]"], x_type="log")
+    for (name, parts), colour in zip(curves.items(), colours):
+        for row, values in enumerate(parts, 1):
+            _line(figure, frequency_hz, values, row, name, colour, legend=row == 1)
+    decades = np.log10(frequency_hz[-1] / frequency_hz[0])
+    figure.update_xaxes(dtick=1 if decades > 2.5 else "D2", exponentformat="power")
+    return figure
+
+
+def shades(count, first=(47, 134, 201), last=(217, 119, 43)):
+    """That many colours from one to another, for curves whose order matters."""
+    share = np.linspace(0, 1, count)[:, None]
+    mixed = np.round((1 - share) * first + share * last).astype(int)
+    return [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in mixed]
+
+
 def response_deviation(curve, points, modelled):
     """How far the measured points are from the model, with the intervals of both.
 

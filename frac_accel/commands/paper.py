@@ -1,0 +1,72 @@
+"""The seed paper (Pietruszczak, on accelerometers with fractional orders): its tables and figures
+again, its claims audited, and its experiment done properly on the bench's bags.
+"""
+
+from ..paper import PaperResult, reproduce
+from ._common import (
+    add_json,
+    add_report,
+    progress,
+    provenance,
+    require_output,
+    require_report,
+    write_json,
+)
+
+
+def add_arguments(parser):
+    """Options of the verb."""
+    parser.add_argument("--quick", action="store_true",
+                        help="tables, figures and audit only, without the study (seconds instead "
+                             "of minutes)")
+    parser.add_argument("--bags", metavar="FOLDER",
+                        help="folder of the study's bags (default: bags/ of the checkout)")
+    add_report(parser)
+    add_json(parser)
+
+
+def run(arguments):
+    """Do it."""
+    require_report(arguments.report)
+    if arguments.json:
+        require_output(arguments.json)
+    with progress(100, unit="%") as bar:
+        def show(words, share):
+            bar.set_description(words, refresh=False)
+            bar.update(max(0, round(100 * share) - bar.n))
+        result = reproduce(not arguments.quick, arguments.bags, show)
+    print(table(result))
+    if arguments.report:
+        from ..report.paper import paper_page
+        paper_page(result, _provenance(arguments, result)).write(arguments.report)
+        print(f"{arguments.report}: written")
+    write_json(arguments.json, result.as_dict())
+
+
+def table(result: PaperResult):
+    """The result as text."""
+    lines = []
+    for number, content in result.tables.items():
+        lines.append(f"Table {number}: {content.title}")
+        for column in content.columns:
+            lines.append(f"  {column.name}: {column.status}")
+            for name, cells in (("paper", column.printed), ("computed", column.computed)):
+                if cells:
+                    lines.append(f"    {name:9}" + "".join(f"{cell:10.4f}" for cell in cells))
+    lines.append("Claims")
+    width = max(len(claim.key) for claim in result.claims)
+    lines += [f"  {claim.key:{width}}  {claim.status}" for claim in result.claims]
+    if result.study is not None:
+        lines += ["Study", *(f"  {line}" for line in result.study.words())]
+    return "\n".join(lines)
+
+
+def _provenance(arguments, result):
+    command = "frac_accel paper" + (" --quick" if arguments.quick else "")
+    if result.study is None:
+        full = {"command": command}
+    else:
+        first, *others = (provenance(bag, command) for bag in result.study.bags)
+        full = {**first, "bag": [first["bag"], *(other["bag"] for other in others)],
+                "sha256": [first["sha256"], *(other["sha256"] for other in others)]}
+    return full
