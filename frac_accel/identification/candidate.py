@@ -17,7 +17,7 @@ from .fit_validation import band_fits
 from .measured_response import MeasuredResponse
 from .output_error import Fit, fit_output_error
 from .prediction import predicted
-from .record_checks import RecordCheck, check_record
+from .record_checks import RecordCheck, check_record, require_magnitude
 from .structures import (
     FractionalStructure,
     FractionalTransferFunctionStructure,
@@ -51,6 +51,7 @@ class Data:
     def of(cls, pair, axis, progress):
         """Check a pair and measure its response."""
         column = AXES.index(axis)
+        require_magnitude(pair, axis)
         require_excitation(pair.reference[:, column], pair.sampling_rate_hz, FEWEST_COEFFICIENTS)
         progress("checking the record")
         record = check_record(pair, axis)
@@ -60,15 +61,16 @@ class Data:
         return cls(record, pair, pair.reference[:, column], sensor,
                    float(np.std(sensor[pair.valid])), MeasuredResponse.of(pair, axis), progress)
 
-    def fit(self, structure, part=slice(None), start=None, uncertainty=True):
-        """Fit of a structure to a part of the record."""
-        if start is None:
-            start = self.response.start(structure)
+    def fit(self, structure, part=slice(None), start=None, uncertainty=True, held=None):
+        """Fit of a structure to a part of the record; options as in `fit_output_error`."""
         record = (self.reference[part], self.sensor[part], self.pair.sampling_rate_hz,
-                  self.pair.valid[part], self.pair.lag_s, start)
+                  self.pair.valid[part], self.pair.lag_s)
         if isinstance(structure, ArxStructure):
-            return fit_arx(*record)
-        return fit_output_error(structure, *record, uncertainty)
+            return fit_arx(*record, start)
+        hint = self.response.start(structure) if start is None else None
+        if self.response.stepped and hint is not None:
+            start, hint = hint, None
+        return fit_output_error(structure, *record, start, uncertainty, hint, held)
 
     def predicted(self, structure, fit, part):
         """Prediction of a part of the record by the model of a fit, offset included."""

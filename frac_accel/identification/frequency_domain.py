@@ -184,6 +184,8 @@ class _Problem:
         inverse = np.linalg.pinv(jacobian / scale, rcond=1e-12)
         covariance = inverse @ inverse.T / np.outer(scale, scale) * max(chi_squared, 1.0)
         values = np.r_[found.x[0], own, found.x[-1] / self.rate]
+        at_bounds = tuple(name for name, side in zip(self.structure.names, found.active_mask[1:])
+                          if side)
         return ResponseFit(("sensitivity", *self.structure.names, "delay_s"), values, covariance,
-                           found.fun, found.x[1:], float(chi_squared),
+                           found.fun, found.x[1:], at_bounds, float(chi_squared),
                            float(np.sqrt(np.mean(np.abs(self.parts(found.x)[0] - 1)**2))))

@@ -48,11 +48,14 @@ class Fit:
         ``sensitivity``, the structure's parameters, ``delay_s``, ``offset``.
     values : ndarray, shape (p,)
     covariance : ndarray, shape (p, p)
-        Allows for a residual that is not white.
+        Allows for a residual that is not white, and for the way that the data would go beyond a
+        bound of the search.
     residual : ndarray, shape (n,)
         Measured less simulated [output units]; NaN where not judged.
     unknowns : ndarray
         Where the search ended, in its own coordinates.
+    at_bounds : tuple of str
+        The structure's parameters with which it ended at a bound of the search.
     """
 
     names: tuple
@@ -60,6 +63,7 @@ class Fit:
     covariance: np.ndarray
     residual: np.ndarray
     unknowns: np.ndarray
+    at_bounds: tuple
 
     @property
     def std(self):
@@ -76,7 +80,7 @@ class Fit:
 
 
 def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0,
-                     start=None, uncertainty=True):
+                     start=None, uncertainty=True, hint=None, held=None):
     r"""Parameters of a structure, with sensitivity, delay and offset.
 
     Minimises the sum of the squared differences between the measured output and that simulated
@@ -104,6 +108,10 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
         `Fit.unknowns` of a fit of the same structure to start from, instead of the grid.
     uncertainty : bool
         Whether the covariance is wanted; NaN otherwise.
+    hint : ndarray, optional
+        Unknowns to start from besides the grid's best.
+    held : dict of int to float, optional
+        Values of unknowns that are known, by place; they get no variance. With `start` only.
 
     Returns
     -------
@@ -119,18 +127,18 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
         part = strongest_stretch(reference, _START_LENGTH, valid)
         rough = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
                          None if valid is None else valid[part], lag_s)
-        state = rough.solve(rough.starts())
+        state = rough.solve(rough.starts() if hint is None else [hint, *rough.starts()])
         if rough.n == len(sensor):
             return rough.result(state, uncertainty)
         start = state.theta
-    problem = _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s)
+    problem = _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s, held)
     return problem.result(problem.solve([start]), uncertainty)
 
 
 class _Problem:
     """Unknowns of the search: the structure's own and the delay in samples."""
 
-    def __init__(self, structure, reference, sensor, rate, valid, lag_s):
+    def __init__(self, structure, reference, sensor, rate, valid, lag_s, held=None):
         self.structure, self.rate, self.lag_s = structure, rate, lag_s
         self.n = len(sensor)
         # the usual level is taken as steady before the record (its response is a constant), with
@@ -153,6 +161,8 @@ class _Problem:
         self.reference, self.whole = reference, sensor
         low, high = structure.bounds(rate, self.n)
         self.low, self.high = np.r_[low, -self.n / 4], np.r_[high, self.n / 4]
+        for place, value in (held or {}).items():
+            self.low[place] = self.high[place] = value
 
     def solve(self, starts):
         """State with the least cost that a search from one of the starts ends in."""
@@ -303,7 +313,8 @@ class _Problem:
         linear = _solve(known @ known.T + faint, known @ self.sensor)
         residual = self.sensor - linear @ known
         noise = residual @ residual / len(residual)
-        if swing is not None and np.sum((linear[2:4] @ known[2:4])**2) > _FEIGNED * noise:
+        real = swing is not None and np.sum((linear[2:4] @ known[2:4])**2) > _FEIGNED * noise
+        if real:
             # with the pole, what it left behind changes as well; what noise feigns of it does not
             change = (linear[2] - 1j * linear[3]) / linear[0] * self.instants * swing
             rows[count:-1] += np.outer(pole_slopes.real, change.real)
@@ -311,7 +322,8 @@ class _Problem:
         gram, right = rows @ rows.T, rows @ self.sensor
         gram[:count, :count] += faint
         cost = residual @ residual + linear @ faint @ linear
-        return _State(theta, float(cost), linear, rows, residual, gram, right)
+        return _State(theta, float(cost), linear, rows, residual, gram, right,
+                      swing, real)
 
     def require_relation(self, explained):
         if explained < min(_CHANCE / self.independent(), 0.5):
@@ -332,6 +344,8 @@ class _Problem:
         own, factors = self.structure.physical(theta[:-1])
         names = ("sensitivity", *self.structure.names, "delay_s", "offset")
         covariance = np.full((len(names), len(names)), np.nan)
+        held = self.low == self.high
+        stuck = ((theta <= self.low) | (theta >= self.high)) & ~held
         if uncertainty:
             jacobian = state.rows.copy()
             # the offset is what remains with the whole reference, not with the part that moves
@@ -340,19 +354,36 @@ class _Problem:
             jacobian[count:-1] = np.linalg.solve(factors.T, jacobian[count:-1])
             jacobian[-1] *= self.rate
             # sensitivity, structure, delay, offset, free motions
-            order = [0, *range(count, len(jacobian)), *range(1, count)]
-            covariance = sandwich(jacobian[order].T, state.residual, self.used)
-            covariance = covariance[:len(names), :len(names)]
+            order = [0, *(count + np.flatnonzero(~held)), *range(1, count)]
+            jacobian = jacobian[order]
+            if state.swing is not None and (stuck.any() or not state.real):
+                # what noise, or a tone that never decays, can feign of a swing tells no frequency
+                longer = self.instants * state.swing
+                jacobian = np.concatenate([jacobian, [longer.real, longer.imag]])
+            free = np.flatnonzero(np.r_[True, ~held, True])
+            within = sandwich(jacobian.T, state.residual, self.used)
+            if stuck.any():
+                # the bound is ours, not the sensor's: how far the data would go is not known better
+                gram, right = jacobian @ jacobian.T, jacobian @ state.residual
+                beyond = _solve(gram, right)
+                within += np.outer(beyond, beyond)
+            covariance = np.zeros_like(covariance)
+            covariance[np.ix_(free, free)] = within[:len(free), :len(free)]
         full = np.full(self.n, np.nan)
         full[self.used] = state.residual
         offset = linear[1] - linear[0] * self.level
         values = np.r_[linear[0], own, theta[-1] / self.rate, offset]
-        return Fit(names, values, covariance, full, theta)
+        at_bounds = tuple(name for name, here in zip((*self.structure.names, "delay_s"), stuck)
+                          if here)
+        return Fit(names, values, covariance, full, theta, at_bounds)
 
 
 @dataclasses.dataclass(frozen=True)
 class _State:
-    """A place in the search: rows as in `_Problem.rows`, the first of them with coefficients."""
+    """A place in the search: rows as in `_Problem.rows`, the first of them with coefficients.
+
+    Besides, the free swing, and whether it is more than noise could feign.
+    """
 
     theta: np.ndarray
     cost: float
@@ -361,6 +392,8 @@ class _State:
     residual: np.ndarray
     gram: np.ndarray
     right: np.ndarray
+    swing: np.ndarray | None
+    real: bool
     converged: bool = False
 
     def reduced(self):

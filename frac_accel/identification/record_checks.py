@@ -33,6 +33,8 @@ _JUMP = 0.3
 _CLIPPED_SENSOR = 0.3
 _CLIPPED_REFERENCE = 1e-3
 _LEFT = 0.1
+# Sizes of which the squares of squares are still numbers; no unit leads out of here.
+_SMALLEST, _LARGEST = 1e-30, 1e30
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,6 +88,24 @@ def check_record(pair, axis="x"):
     return RecordCheck(dataclasses.replace(pair, valid=valid), missing,
                        int(np.sum(moving & ~valid)), int(np.sum(pair.valid & ~moving)),
                        notes + standing_notes + clipping_notes)
+
+
+def require_magnitude(pair, axis="x"):
+    """Refuse values of a size that no acceleration has in any unit.
+
+    Raises
+    ------
+    IdentificationError
+        Naming the topic and its largest value.
+    """
+    for name in ("reference", "sensor"):
+        sizes = np.max(np.abs(getattr(pair, name)), axis=0)
+        largest = np.max(sizes)
+        if not (_SMALLEST < sizes[AXES.index(axis)] and largest < _LARGEST):
+            raise IdentificationError(
+                f"the {name}'s values go up to {largest:.3g}, expected something between "
+                f"{_SMALLEST:g} and {_LARGEST:g}: no unit of acceleration makes them so "
+                f"{'small' if largest < 1 else 'large'}; is the topic corrupt?")
 
 
 def _require_no_copy(reference, sensor, valid):
