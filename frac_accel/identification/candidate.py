@@ -11,7 +11,7 @@ from ..model import AXES
 from ..pair import Pair
 from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
 from .direction import exchanged_instead, judge_direction
-from .excitation import learning_length, require_excitation
+from .excitation import learning_length, persistent_excitation, require_order
 from .fit_checks import far_apart, require_time_to_answer
 from .fit_validation import band_fits
 from .measured_response import MeasuredResponse
@@ -37,7 +37,10 @@ STRUCTURES = {"arx": ArxStructure(), "oscillator": OscillatorStructure(),
 
 @dataclasses.dataclass(frozen=True)
 class Data:
-    """One axis of a checked record, and its frequency response without a model."""
+    """One axis of a checked record, its frequency response without a model, and its excitation.
+
+    `order` is that of persistent excitation, `lines_hz` are what gives it.
+    """
 
     record: RecordCheck
     pair: Pair
@@ -46,20 +49,24 @@ class Data:
     spread: float
     response: MeasuredResponse
     progress: Callable
+    order: int
+    lines_hz: list
 
     @classmethod
     def of(cls, pair, axis, progress):
         """Check a pair and measure its response."""
         column = AXES.index(axis)
         require_magnitude(pair, axis)
-        require_excitation(pair.reference[:, column], pair.sampling_rate_hz, FEWEST_COEFFICIENTS)
+        excited = persistent_excitation(pair.reference[:, column], pair.sampling_rate_hz)
+        require_order(*excited, pair.sampling_rate_hz, FEWEST_COEFFICIENTS)
         progress("checking the record")
         record = check_record(pair, axis)
         pair = record.pair
         sensor = pair.sensor[:, column]
         progress("measuring the frequency response")
-        return cls(record, pair, pair.reference[:, column], sensor,
-                   float(np.std(sensor[pair.valid])), MeasuredResponse.of(pair, axis), progress)
+        return cls(record, pair, pair.reference[:, column].copy(), sensor.copy(),
+                   float(np.std(sensor[pair.valid])), MeasuredResponse.of(pair, axis), progress,
+                   *excited)
 
     def fit(self, structure, part=slice(None), start=None, uncertainty=True, held=None):
         """Fit of a structure to a part of the record; options as in `fit_output_error`."""
@@ -165,7 +172,7 @@ def fit_of(structure, data, start=None):
     IdentificationError
         If there is none; says if there is one of exchanged topics or with other stamps.
     """
-    require_excitation(data.reference, data.pair.sampling_rate_hz, needed_order(structure))
+    require_order(data.order, data.lines_hz, data.pair.sampling_rate_hz, needed_order(structure))
     try:
         return data.fit(structure, start=start)
     except IdentificationError as error:

@@ -56,6 +56,8 @@ class Fit:
         Where the search ended, in its own coordinates.
     at_bounds : tuple of str
         The structure's parameters with which it ended at a bound of the search.
+    gradient : ndarray, shape (p - 1, m), or None
+        Derivatives of the output by all parameters but the offset, at the m samples that count.
     """
 
     names: tuple
@@ -64,6 +66,7 @@ class Fit:
     residual: np.ndarray
     unknowns: np.ndarray
     at_bounds: tuple
+    gradient: np.ndarray | None
 
     @property
     def std(self):
@@ -201,12 +204,15 @@ class _Problem:
         # neighbours in frequency end in the same place; other dampings may not
         kinds = np.c_[np.round(grid[:, 0], 1), np.round(grid[:, 1:], 3)].tolist()
         groups = grid[:, held].tolist()
+        most = self.structure.starting_points * len(set(map(tuple, groups)))
         for point in np.argsort(explained)[::-1]:
             kind = tuple(kinds[point])
             group = seen.setdefault(tuple(groups[point]), set())
             if kind not in group and len(group) < self.structure.starting_points:
                 group.add(kind)
-                chosen.append(np.r_[grid[point], delays[best_delay[point]]])
+                chosen.append([*grid[point], delays[best_delay[point]]])
+                if len(chosen) == most:
+                    break
         model = _AveragedResponse(self.structure, s, prepared, response, np.sqrt(weight), self)
         costs, improved = model.improve(np.array(chosen))
         # half a period of the resonance, with the other polarity, looks much the same
@@ -232,7 +238,8 @@ class _Problem:
         own, delay = theta[:-1], theta[-1] / self.rate - self.lag_s
         response, slopes = self.structure.gradient(self.prepared, own)
         spectra = np.array([response, *slopes, response * (-self.convolution.s / self.rate)])
-        spectra *= np.exp(-self.convolution.s * delay)
+        s = self.convolution.s
+        spectra *= _exponential(-s[0] * delay, -(s[1] - s[0]) * delay, len(s))
         simulated = self.convolution.response(spectra)[:, _WAY:][:, self.judged]
         # one that is over long before the first used sample is none
         decays = [np.exp(-rate * self.instants)
@@ -240,7 +247,7 @@ class _Problem:
                   if -rate * self.instants[0] > _OVER]
         pole, pole_slopes = self.structure.mode(own)
         rings = pole is not None and pole.real * self.instants[0] > _OVER
-        swing = np.exp(pole * self.instants) if rings else None
+        swing = _exponential(0.0, pole / self.rate, self.n)[self.judged] if rings else None
         free = [swing.real, swing.imag, *decays] if rings else decays
         rows = np.array([simulated[0], np.ones(len(self.sensor)), *free, *simulated[1:]])
         return rows, 2 + len(free), swing, pole_slopes
@@ -346,6 +353,7 @@ class _Problem:
         covariance = np.full((len(names), len(names)), np.nan)
         held = self.low == self.high
         stuck = ((theta <= self.low) | (theta >= self.high)) & ~held
+        gradient = None
         if uncertainty:
             jacobian = state.rows.copy()
             # the offset is what remains with the whole reference, not with the part that moves
@@ -354,6 +362,7 @@ class _Problem:
             jacobian[count:-1] = np.linalg.solve(factors.T, jacobian[count:-1])
             jacobian[-1] *= self.rate
             # sensitivity, structure, delay, offset, free motions
+            gradient = jacobian[[0, *range(count, len(jacobian))]]
             order = [0, *(count + np.flatnonzero(~held)), *range(1, count)]
             jacobian = jacobian[order]
             if state.swing is not None and (stuck.any() or not state.real):
@@ -375,7 +384,7 @@ class _Problem:
         values = np.r_[linear[0], own, theta[-1] / self.rate, offset]
         at_bounds = tuple(name for name, here in zip((*self.structure.names, "delay_s"), stuck)
                           if here)
-        return Fit(names, values, covariance, full, theta, at_bounds)
+        return Fit(names, values, covariance, full, theta, at_bounds, gradient)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -456,6 +465,13 @@ class _AveragedResponse:
         rows[:, 1:] *= gain[:, None, None]
         return (np.einsum("mf,mf->m", error, error), rows @ rows.transpose(0, 2, 1),
                 np.einsum("mpf,mf->mp", rows, error))
+
+
+def _exponential(first, step, count):
+    """exp(first + step k), k = 0 ... count - 1, as products of few exponentials."""
+    inner = int(np.sqrt(count)) + 1
+    outer = np.exp(first + step * inner * np.arange(-(-count // inner)))
+    return np.outer(outer, np.exp(step * np.arange(inner))).ravel()[:count]
 
 
 def _real(values):

@@ -99,13 +99,14 @@ def require_magnitude(pair, axis="x"):
         Naming the topic and its largest value.
     """
     for name in ("reference", "sensor"):
-        sizes = np.max(np.abs(getattr(pair, name)), axis=0)
-        largest = np.max(sizes)
-        if not (_SMALLEST < sizes[AXES.index(axis)] and largest < _LARGEST):
+        values = getattr(pair, name)
+        largest = max(values.max(), -values.min())
+        moved = np.ptp(values[:, AXES.index(axis)])
+        if largest >= _LARGEST or 0 < moved <= _SMALLEST:
+            words = f"go up to {largest:.3g}" if largest >= _LARGEST else f"vary by {moved:.3g}"
             raise IdentificationError(
-                f"the {name}'s values go up to {largest:.3g}, expected something between "
-                f"{_SMALLEST:g} and {_LARGEST:g}: no unit of acceleration makes them so "
-                f"{'small' if largest < 1 else 'large'}; is the topic corrupt?")
+                f"the {name}'s values {words}, expected something between {_SMALLEST:g} and "
+                f"{_LARGEST:g}: no unit of acceleration makes them so; is the topic corrupt?")
 
 
 def _require_no_copy(reference, sensor, valid):
@@ -156,7 +157,7 @@ def _dependent(values):
     excited = _excited(values)
     if len(excited) < 2:
         return ""
-    strength, direction = np.linalg.eigh(np.corrcoef(values[:, excited].T))
+    strength, direction = np.linalg.eigh(np.corrcoef(np.ascontiguousarray(values[:, excited].T)))
     if strength[0] > _COLLINEAR:
         return ""
     dependent = np.any(np.abs(direction[:, strength <= _COLLINEAR]) > 0.1, axis=1)
@@ -164,7 +165,7 @@ def _dependent(values):
 
 
 def _excited(values):
-    spread = np.std(values, axis=0)
+    spread = np.std(np.ascontiguousarray(values.T), axis=1)
     return np.flatnonzero(spread > 1e-6 * spread.max())
 
 

@@ -106,7 +106,7 @@ def identification(chosen, reason, datas, records, axis, provenance, agreeing=No
     fit, data = chosen.fit, datas[0]
     rate = data.pair.sampling_rate_hz
     doubts = [(data.record.notes + suspicions(own, data)) for own, data in zip(chosen.fits, datas)]
-    excitation = Excitation.of(data.record, data.reference, data.sensor,
+    excitation = Excitation.of(data.record, data.reference, data.sensor, data.order,
                                needed_order(chosen.structure), data.response.excitation)
     parameters = {name: {"value": float(value), "std": float(std), "unit": _unit(name)}
                   for name, value, std in zip(fit.names, fit.values, fit.std)}
