@@ -14,7 +14,8 @@ _SHARE_SEGMENTS = 32
 def bulk_delay(reference, sensor):
     """Whole samples by which the sensor is later than the reference: the correlation's peak."""
     n = len(reference)
-    length = next_fast_len(2 * n, real=True)
+    # room for the lags that are looked at
+    length = next_fast_len(n + n // 4 + 1, real=True)
     shared = irfft(np.conj(rfft(reference - reference.mean(), length))
                    * rfft(sensor - sensor.mean(), length), length)
     lags = np.r_[0:n // 4, -(n // 4):0]

@@ -1,6 +1,7 @@
 """Output-error fit of a continuous-time model structure to a measured pair, in the time domain."""
 
 import dataclasses
+import functools
 
 import numpy as np
 from scipy.fft import rfft
@@ -9,7 +10,7 @@ from ..convolution import Convolution
 from ..errors import IdentificationError
 from .excitation import strongest_stretch
 from .frequency_response import averaged_response, bulk_delay
-from .uncertainty import sandwich
+from .uncertainty import sandwich, white_noise
 
 # Samples at both ends that the band-limited simulation cannot know, besides the unknown start.
 _EDGE = 32
@@ -77,6 +78,11 @@ class Fit:
     def rmse(self):
         """RMS of the residual [output units]."""
         return float(np.sqrt(np.nanmean(self.residual**2)))
+
+    @functools.cached_property
+    def noise_std(self):
+        """White part of the residual (`white_noise`)."""
+        return white_noise(self.residual)
 
     def __getitem__(self, name):
         return float(self.values[self.names.index(name)])
@@ -213,13 +219,12 @@ class _Problem:
                 chosen.append([*grid[point], delays[best_delay[point]]])
                 if len(chosen) == most:
                     break
-        model = _AveragedResponse(self.structure, s, prepared, response, np.sqrt(weight), self)
-        costs, improved = model.improve(np.array(chosen))
         # half a period of the resonance, with the other polarity, looks much the same
         half = np.r_[np.zeros(len(held)), self.rate / (2 * peak)]
-        best = improved[np.argmin(costs)]
-        further, others = model.improve(np.array([best - half, best + half]))
-        costs, improved = np.r_[costs, further], np.r_[improved, others]
+        chosen = np.array(chosen)
+        chosen = np.concatenate([chosen, [chosen[0] - half, chosen[0] + half]])
+        model = _AveragedResponse(self.structure, s, prepared, response, np.sqrt(weight), self)
+        costs, improved = model.improve(chosen)
         lag = bulk + self.lag_s * self.rate
         starts = []
         for place in np.argsort(costs):

@@ -113,7 +113,10 @@ def _one_short_event(moving):
 
 
 def _tones(moving, rate):
-    """Stretches in which the phase is a straight line, and the energy in them."""
+    """Stretches in which the phase is a straight line, and the energy in them.
+
+    None where they hold too little of it to matter.
+    """
     n = len(moving)
     analytic = hilbert(moving, next_fast_len(n))[:n]
     size = max(4, n // _BLOCKS)
@@ -122,19 +125,24 @@ def _tones(moving, rate):
     # most of noise is no longer straight than this: all of it at once
     short = {length: _straight(sliding_window_view(phase, length))
              for length in range(_FEWEST_BLOCKS, 2 * _FEWEST_BLOCKS + 1) if length <= count}
-    tones, energy, first = [], 0.0, 0
-    for begin in np.flatnonzero(short[_FEWEST_BLOCKS]) if short else ():
-        if begin < first:
-            continue
-        first, last = begin, _straight_until(phase, begin, short)
-        place = np.arange(last - first) - (last - first - 1) / 2
-        slope = place @ phase[first:last] / (place @ place)
+    stretches, first = [], 0
+    for begin in np.flatnonzero(short[_FEWEST_BLOCKS]).tolist() if short else ():
+        if begin >= first:
+            first = _straight_until(phase, begin, short)
+            stretches.append((begin, first))
+    before = np.r_[0.0, np.cumsum(moving**2)]
+    if sum(before[last * size] - before[begin * size] for begin, last in stretches) \
+            < _TONAL * before[-1]:
+        return [], 0.0
+    tones, energy = [], 0.0
+    for begin, last in stretches:
+        place = np.arange(last - begin) - (last - begin - 1) / 2
+        slope = place @ phase[begin:last] / (place @ place)
         frequency = abs(slope) * rate / (2 * np.pi * size)
-        tone = Tone(first * size, last * size, float(frequency))
+        tone = Tone(begin * size, last * size, float(frequency))
         if _is_sine(analytic[tone.start:tone.stop], tone, rate, size):
             tones.append(tone)
             energy += float(np.sum(moving[tone.start:tone.stop]**2))
-        first = last
     return _without_transitions(tones, moving), energy
 
 

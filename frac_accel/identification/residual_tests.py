@@ -215,7 +215,7 @@ def _moments(error, reference, used, lags, gradient, noise):
     denominator, variance = noise
     others = np.ones((n, 1)) if gradient is None else np.c_[np.ones(n), gradient]
     others = others / np.maximum(np.max(np.abs(others), axis=0), 1e-300)
-    edges = np.flatnonzero(np.diff(np.r_[False, used, False]))
+    edges = _edges(used)
     if len(denominator) == 1 and len(edges) == 2:
         gram, right = _white_moments(error, reference, edges, lags, others)
         return gram, variance * gram, right
@@ -243,6 +243,11 @@ def _moments(error, reference, used, lags, gradient, noise):
         tail, state = lfilter([1.0], denominator, np.zeros((256, width)), axis=0, zi=state)
         coloured += tail.T @ tail
     return gram, variance * (coloured if len(denominator) > 1 else gram), right
+
+
+def _edges(used):
+    """Where used samples begin and end, in turn."""
+    return np.flatnonzero(np.diff(used, prepend=False, append=False))
 
 
 def _white_moments(error, reference, edges, lags, others):
@@ -274,7 +279,10 @@ def _autocovariance(error, used, most):
     """Autocovariance from the pairs of samples that exist, and their numbers; lags 0 ... most."""
     n = len(error)
     present = used.astype(float)
-    pairs = np.array([present[lag:] @ present[:n - lag] for lag in range(most + 1)])
+    if len(_edges(used)) == 2:
+        pairs = used.sum() - np.arange(most + 1.0)
+    else:
+        pairs = np.array([present[lag:] @ present[:n - lag] for lag in range(most + 1)])
     sums = np.array([error[lag:] @ error[:n - lag] for lag in range(most + 1)])
     return sums / np.maximum(pairs, 1), pairs
 

@@ -58,7 +58,8 @@ def white_noise(residual):
     Below, the residual also holds what the model gets wrong, which is not noise.
     """
     clean = np.nan_to_num(residual)
-    power = np.abs(np.fft.rfft(clean * np.hanning(len(clean))))**2
-    window = np.sum(np.hanning(len(clean))**2)
+    taper = np.hanning(len(clean))
+    power = np.abs(rfft(clean * taper))**2
+    window = taper @ taper
     # the median of a chi-squared of two degrees is ln 2 of its mean
     return float(np.sqrt(np.median(power[len(power) // 2:]) / np.log(2) / window))
