@@ -341,7 +341,8 @@ class _Problem:
         if explained < min(_CHANCE / self.independent(), 0.5):
             raise IdentificationError(
                 "the sensor's output has nothing to do with the reference: the best model explains "
-                f"{max(explained, 0):.2%} of its power, which chance alone can do")
+                f"{max(explained, 0):.2%} of its power, which chance alone can do; were both "
+                "recorded at the same time, with stamps of one clock?")
 
     def independent(self):
         """Number of independent frequencies that reference and sensor have in common."""
