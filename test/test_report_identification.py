@@ -1,6 +1,7 @@
 """`identify --report` tells what `identify` found, and refuses early what it could not write."""
 
 import base64
+import dataclasses
 import json
 import re
 from pathlib import Path
@@ -8,8 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from frac_accel import SensorModel
+from frac_accel import SensorModel, identify
 from frac_accel.cli import main
+from frac_accel.errors import ModelError
+from frac_accel.pair import load_pair
+from frac_accel.report.identification import identification_page
 from frac_accel.report.quantity import percent, rounded
 from frac_accel.uncertainty import response_uncertainty
 
@@ -81,3 +85,18 @@ def test_values_end_where_their_uncertainty_begins(value, std, expected):
 
 def test_percent():
     assert [percent(share) for share in (0.000213, 0.05, 1.094)] == ["0.021 %", "5 %", "109 %"]
+
+
+def test_page_without_interval_says_why(tmp_path):
+    """Parameters so open that hardly a draw of them is a sensor."""
+    pair = load_pair(BAG, axis="y")
+    result = identify(pair, axis="y", structure="oscillator")
+    covariance = result.model.metadata["covariance"]
+    wide = {**covariance, "matrix": (1e12 * np.array(covariance["matrix"])).tolist()}
+    model = SensorModel(result.model.core, result.model.effects,
+                        metadata={**result.model.metadata, "covariance": wide})
+    with pytest.raises(ModelError, match="not determined"):
+        response_uncertainty(model, np.array([100.0, 200.0]))
+    page = identification_page(dataclasses.replace(result, model=model), pair, "y", {})
+    page.write(tmp_path / "r.html")
+    assert "without an interval" in (tmp_path / "r.html").read_text()

@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from scipy.signal.windows import tukey
 
 from ..convolution import Convolution
 from ..effects.time_delay import TimeDelay
@@ -148,7 +149,8 @@ def band_fits(measured, simulated, sampling_rate_hz, bands):
     -------
     list of BandFit
     """
-    taper = np.hanning(len(measured))
+    # a tenth at either end, where leakage would count
+    taper = tukey(len(measured), 0.2)
     error, moving = measured - simulated, measured - measured.mean()
     # a mean error belongs to the band that begins at zero
     error = error - (bands[0][0] > 0) * error.mean()
