@@ -75,3 +75,25 @@ def test_fractional_sensor_is_found():
         result = identify(pair)
         assert result.structure == "fractional", core
         assert result.model.core.damping_order == pytest.approx(core["damping_order"], abs=0.1)
+
+
+def test_a_bound_of_the_search_is_named_and_does_not_feign_certainty():
+    """A damping of order 1.3 with a structure whose order may not exceed 1.1."""
+    class Limited(FractionalStructure):
+        def bounds(self, rate, n):
+            low, high = super().bounds(rate, n)
+            return low, [*high[:2], 1.1]
+
+    rng = np.random.default_rng(50262)
+    sensor = rig.draw_sensor(rng, RATE_HZ, "fractional", damping_order=(1.3, 1.3),
+                             damping_ratio=(0.2, 0.2), natural_frequency=(0.08, 0.08))
+    excitation = rig.band_noise(rng, RATE_HZ, 2.0, (5.0, 700.0), (1.0, 0.0, 0.0), lead_s=1.0)
+    record = rig.simulate_record(sensor, excitation, rng, snr_db=40.0)
+    pair = record.reference[:, 0], record.sensor[:, 0], RATE_HZ
+    free, limited = (fit_output_error(structure, *pair)
+                     for structure in (FractionalStructure(), Limited()))
+    assert free.at_bounds == () and limited.at_bounds == ("damping_order",)
+    scores = [(fit["damping_order"] - 1.3) / fit.std[fit.names.index("damping_order")]
+              for fit in (free, limited)]
+    assert np.all(np.abs(scores) < 4)
+    assert limited.std[1] > 5 * free.std[1]

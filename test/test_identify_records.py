@@ -129,8 +129,6 @@ def test_transfer_functions_of_several_records_have_the_same_orders():
     assert np.median(error) < 0.01
 
 
-@pytest.mark.xfail(strict=True, reason="the delay, open together with a resonance far above the "
-                   "excitation, is called different in the second record")
 def test_open_parameters_have_a_mean():
     """A resonance 15 times above the excitation: linearised covariances of it mean nothing."""
     rng = np.random.default_rng(20338)

@@ -295,6 +295,14 @@ def test_excitation_is_reported(tmp_path, capsys):
     assert f"reference RMS {check['rms']:.4g} m/s^2" in out
 
 
+@pytest.mark.parametrize("factor, words", [(1e200, "go up to"), (1e-200, "vary by")])
+def test_values_beyond_any_unit(factor, words):
+    _, reference, raw = measured(61)
+    raw = raw._replace(values=raw.values * factor)
+    with pytest.raises(IdentificationError, match=f"the sensor's values {words} .*corrupt"):
+        run(reference, raw)
+
+
 def test_lattice_step():
     rng = np.random.default_rng(20261205)
     lattice = 0.013 * rng.integers(-40, 40, 2000) + 0.7

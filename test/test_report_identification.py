@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from frac_accel import SensorModel
+from frac_accel import SensorModel, identify
 from frac_accel.cli import main
+from frac_accel.errors import ModelError
+from frac_accel.pair import load_pair
+from frac_accel.report.identification import identification_page
 from frac_accel.report.quantity import percent, rounded
 from frac_accel.uncertainty import response_uncertainty
 
@@ -81,3 +84,16 @@ def test_values_end_where_their_uncertainty_begins(value, std, expected):
 
 def test_percent():
     assert [percent(share) for share in (0.000213, 0.05, 1.094)] == ["0.021 %", "5 %", "109 %"]
+
+
+def test_page_without_interval_says_why(tmp_path, monkeypatch):
+    """What `response_uncertainty` raises where hardly a draw of the parameters is a sensor."""
+    def refuse(*_):
+        raise ModelError("covariance: the data have not determined the parameters")
+
+    monkeypatch.setattr("frac_accel.report.identification.response_uncertainty", refuse)
+    pair = load_pair(BAG, axis="y")
+    result = identify(pair, axis="y", structure="oscillator")
+    identification_page(result, pair, "y", {}).write(tmp_path / "r.html")
+    text = (tmp_path / "r.html").read_text()
+    assert "without an interval: covariance: the data have not determined" in text

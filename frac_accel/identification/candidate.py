@@ -11,13 +11,13 @@ from ..model import AXES
 from ..pair import Pair
 from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
 from .direction import exchanged_instead, judge_direction
-from .excitation import learning_length, require_excitation
+from .excitation import learning_length, persistent_excitation, require_order
 from .fit_checks import far_apart, require_time_to_answer
 from .fit_validation import band_fits
 from .measured_response import MeasuredResponse
 from .output_error import Fit, fit_output_error
 from .prediction import predicted
-from .record_checks import RecordCheck, check_record
+from .record_checks import RecordCheck, check_record, require_magnitude
 from .structures import (
     FractionalStructure,
     FractionalTransferFunctionStructure,
@@ -37,7 +37,10 @@ STRUCTURES = {"arx": ArxStructure(), "oscillator": OscillatorStructure(),
 
 @dataclasses.dataclass(frozen=True)
 class Data:
-    """One axis of a checked record, and its frequency response without a model."""
+    """One axis of a checked record, its frequency response without a model, and its excitation.
+
+    `order` is that of persistent excitation, `lines_hz` are what gives it.
+    """
 
     record: RecordCheck
     pair: Pair
@@ -46,29 +49,35 @@ class Data:
     spread: float
     response: MeasuredResponse
     progress: Callable
+    order: int
+    lines_hz: list
 
     @classmethod
     def of(cls, pair, axis, progress):
         """Check a pair and measure its response."""
         column = AXES.index(axis)
-        require_excitation(pair.reference[:, column], pair.sampling_rate_hz, FEWEST_COEFFICIENTS)
+        require_magnitude(pair, axis)
+        excited = persistent_excitation(pair.reference[:, column], pair.sampling_rate_hz)
+        require_order(*excited, pair.sampling_rate_hz, FEWEST_COEFFICIENTS)
         progress("checking the record")
         record = check_record(pair, axis)
         pair = record.pair
         sensor = pair.sensor[:, column]
         progress("measuring the frequency response")
-        return cls(record, pair, pair.reference[:, column], sensor,
-                   float(np.std(sensor[pair.valid])), MeasuredResponse.of(pair, axis), progress)
+        return cls(record, pair, pair.reference[:, column].copy(), sensor.copy(),
+                   float(np.std(sensor[pair.valid])), MeasuredResponse.of(pair, axis), progress,
+                   *excited)
 
-    def fit(self, structure, part=slice(None), start=None, uncertainty=True):
-        """Fit of a structure to a part of the record."""
-        if start is None:
-            start = self.response.start(structure)
+    def fit(self, structure, part=slice(None), start=None, uncertainty=True, held=None):
+        """Fit of a structure to a part of the record; options as in `fit_output_error`."""
         record = (self.reference[part], self.sensor[part], self.pair.sampling_rate_hz,
-                  self.pair.valid[part], self.pair.lag_s, start)
+                  self.pair.valid[part], self.pair.lag_s)
         if isinstance(structure, ArxStructure):
-            return fit_arx(*record)
-        return fit_output_error(structure, *record, uncertainty)
+            return fit_arx(*record, start)
+        hint = self.response.start(structure) if start is None else None
+        if self.response.stepped and hint is not None:
+            start, hint = hint, None
+        return fit_output_error(structure, *record, start, uncertainty, hint, held)
 
     def predicted(self, structure, fit, part):
         """Prediction of a part of the record by the model of a fit, offset included."""
@@ -163,7 +172,7 @@ def fit_of(structure, data, start=None):
     IdentificationError
         If there is none; says if there is one of exchanged topics or with other stamps.
     """
-    require_excitation(data.reference, data.pair.sampling_rate_hz, needed_order(structure))
+    require_order(data.order, data.lines_hz, data.pair.sampling_rate_hz, needed_order(structure))
     try:
         return data.fit(structure, start=start)
     except IdentificationError as error:

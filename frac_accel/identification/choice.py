@@ -8,7 +8,8 @@ from ..errors import FracAccelError, IdentificationError
 from .candidate import Candidate, fit_of, fitted
 from .fit_validation import judge_residual
 from .frequency_response import linear_share
-from .records import agreement, combine
+from .records import agreement, combine, freed, is_open
+from .structures import OscillatorStructure
 
 # Standard uncertainties by which the damping order must differ from 1 to be called fractional.
 _SIGNIFICANT = 3.0
@@ -117,7 +118,10 @@ def _combined(name, datas, records):
     datas[0].progress(f"judging the {name} structure on the other records")
     table = [[data.predicted(structure, fit, _settled(structure, fit, data)) for data in datas]
              for fit in fits]
-    combination = combine(fits)
+    compared, held = _held_alike(structure, fits, datas)
+    combination = combine(compared)
+    if held:
+        combination = freed(combination, fits, held)
     joint = dataclasses.replace(first, values=combination.values,
                                 covariance=combination.covariance)
     try:
@@ -134,13 +138,36 @@ def _combined(name, datas, records):
     result = agreement(records, fits, combination,
                        [[entry.nrmse for entry in row] for row in table],
                        [entry.nrmse for entry in joined],
-                       all(test is None or test.independent for test in tests))
+                       all(test is None or test.independent for test in tests), compared, held)
     others = [(i, j) for i in range(len(fits)) for j in range(len(fits)) if i != j]
     worst = max(others, key=lambda pair: table[pair[0]][pair[1]].nrmse)
     return Candidate(structure, name, joint, tuple(fits),
                      float(np.sqrt(np.mean([entry.nrmse**2 for entry in joined]))),
                      float(np.sqrt(np.mean([table[i][j].nrmse**2 for i, j in others]))),
                      table[worst[0]][worst[1]]), result
+
+
+def _held_alike(structure, fits, datas):
+    """Fits to compare the records by, and what is held at the same value in all of them.
+
+    A parameter that a record leaves open takes others with it along a curve, where linearised
+    covariances call records of one sensor different.
+    """
+    held = {}
+    compared = fits
+    # only there is each unknown one parameter's own
+    if type(structure) is not OscillatorStructure:
+        return compared, held
+    for name in structure.names:
+        if not is_open(name, compared):
+            continue
+        position = fits[0].names.index(name)
+        best = min(fits, key=lambda fit: fit.std[position] / fit.values[position])
+        held[name] = best
+        fixed = {structure.names.index(name): fit.unknowns[structure.names.index(name)]
+                 for name, fit in held.items()}
+        compared = [data.fit(structure, start=best.unknowns, held=fixed) for data in datas]
+    return compared, held
 
 
 def _settled(structure, fit, data):

@@ -8,7 +8,6 @@ from ..errors import IdentificationError
 from .excitation import strongest_stretch
 from .output_error import Fit, fit_output_error
 from .structures import OscillatorStructure
-from .uncertainty import white_noise
 
 # The strongest stretch of a long record [samples] tells the direction.
 _LENGTH = 16384
@@ -128,7 +127,7 @@ def judge_direction(fit, reference, sensor, pair):
     """
     std = fit.std[fit.names.index("delay_s")]
     early = fit["delay_s"] < -_SIGNIFICANT * std - _SAMPLES / pair.sampling_rate_hz
-    if not early and fit.rmse < _LACKING * white_noise(fit.residual):
+    if not early and fit.rmse < _LACKING * fit.noise_std:
         return []
     forward = _Way.of(reference, sensor, pair, pair.lag_s)
     error = _exchanged(forward, reference, sensor, pair)
@@ -141,7 +140,7 @@ def judge_direction(fit, reference, sensor, pair):
 
 
 def _exchanged(forward, reference, sensor, pair):
-    if forward is not None and forward.fit.rmse < _LACKING * white_noise(forward.fit.residual):
+    if forward is not None and forward.fit.rmse < _LACKING * forward.fit.noise_std:
         return None
     backward = _Way.of(sensor, reference, pair, -pair.lag_s)
     if backward is None or not backward.determined:

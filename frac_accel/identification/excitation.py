@@ -3,9 +3,10 @@
 import dataclasses
 
 import numpy as np
-from scipy.signal import coherence, medfilt, welch
+from scipy.signal import medfilt
 
 from ..errors import IdentificationError
+from .averaged_spectra import coherence_of, power_of, segment_spectra
 
 # Power of a line or band, of the strongest, below which it is not excitation but noise or leakage.
 _FLOOR = 1e-4
@@ -66,15 +67,17 @@ class Excitation:
     standing: int
 
     @classmethod
-    def of(cls, record, reference, sensor, needed, recognised):
-        """Of one axis of a `RecordCheck`, its kind as recognised."""
+    def of(cls, record, reference, sensor, order, needed, recognised):
+        """Of one axis of a `RecordCheck`, with its order and its kind as recognised."""
         pair = record.pair
-        motion = np.where(pair.valid, reference - reference[pair.valid].mean(), np.nan)
-        levels = [float(np.sqrt(np.nanmean(block**2)))
-                  for block in np.array_split(motion, _BLOCKS) if np.isfinite(block).any()]
-        rms, peak = float(np.sqrt(np.nanmean(motion**2))), float(np.nanmax(np.abs(motion)))
-        return cls(recognised.kind, recognised.words,
-                   persistent_excitation(reference, pair.sampling_rate_hz)[0], needed,
+        motion = np.where(pair.valid, reference - reference[pair.valid].mean(), 0.0)
+        first = np.arange(_BLOCKS) * len(motion) // _BLOCKS
+        energies, counts = (np.add.reduceat(values, first)
+                            for values in (motion**2, pair.valid.astype(float)))
+        levels = np.sqrt(energies[counts > 0] / counts[counts > 0]).tolist()
+        rms = float(np.sqrt(energies.sum() / counts.sum()))
+        peak = float(np.max(np.abs(motion)))
+        return cls(recognised.kind, recognised.words, order, needed,
                    excited_band(reference, sensor, pair.sampling_rate_hz), rms, peak, peak / rms,
                    min(levels), max(levels), pair.sensor_std, len(pair), record.missing,
                    record.clipped, record.standing)
@@ -108,7 +111,9 @@ def excited_band(reference, sensor, sampling_rate_hz):
         Lowest and highest frequency [Hz] between which both hold for most frequencies.
     """
     frequency, power = _spectrum(reference, sampling_rate_hz)
-    _, shared = coherence(reference, sensor, sampling_rate_hz, "hann", _segment(reference) // 4)
+    length = _segment(reference) // 4
+    shared = coherence_of(*(segment_spectra(values, "hann", length)
+                            for values in (reference, sensor)))
     shared = np.interp(frequency, np.linspace(0, sampling_rate_hz / 2, len(shared)), shared)
     strong = ((power > _FLOOR * power.max()) & (shared > _COHERENT)).astype(float)
     most = np.flatnonzero(medfilt(strong, 5))
@@ -143,8 +148,10 @@ def persistent_excitation(reference, sampling_rate_hz):
     lines = []
     for stretch in stretches:
         count = max(1, round(len(stretch) / _LINE_BINS))
-        lines += [float(np.average(frequency[part], weights=power[part]))
-                  for part in np.array_split(stretch, count)]
+        first = np.arange(count) * len(stretch) // count
+        weight, moment = (np.add.reduceat(values[stretch], first)
+                          for values in (power, power * frequency))
+        lines += (moment / weight).tolist()
     return 2 * len(lines), lines
 
 
@@ -156,7 +163,11 @@ def require_excitation(reference, sampling_rate_hz, parameters):
     IdentificationError
         Saying what is excited, how much is needed and where.
     """
-    order, lines = persistent_excitation(reference, sampling_rate_hz)
+    require_order(*persistent_excitation(reference, sampling_rate_hz), sampling_rate_hz, parameters)
+
+
+def require_order(order, lines, sampling_rate_hz, parameters):
+    """The same of a known order of excitation and the lines that give it."""
     if order >= parameters:
         return
     needed = -(-parameters // 2)
@@ -219,8 +230,9 @@ def _energy(reference, valid=None):
 
 
 def _spectrum(reference, sampling_rate_hz):
-    return welch(reference, sampling_rate_hz, "blackmanharris", _segment(reference),
-                 detrend="constant")
+    length = _segment(reference)
+    return (np.fft.rfftfreq(length, 1 / sampling_rate_hz),
+            power_of(segment_spectra(reference, "blackmanharris", length)))
 
 
 def _segment(reference):

@@ -3,14 +3,14 @@
 import dataclasses
 
 import numpy as np
-from scipy.signal import coherence, welch
+from scipy.signal.windows import tukey
 
 from ..convolution import Convolution
 from ..effects.time_delay import TimeDelay
 from ..errors import FracAccelError
-from ..metrics import error_metrics
 from ..model import AxisModel
 from ..uncertainty import UncertainAxis
+from .averaged_spectra import coherence_of, power_of, segment_spectra
 from .residual_tests import ResidualTests, residual_tests
 
 # Held-out residual over the noise floor, and over the output, above which an octave lacks more.
@@ -109,6 +109,20 @@ def judge_residual(core, fit, reference, pair):
     reference : ndarray, shape (n,)
     pair : Pair
     """
+    used = np.isfinite(fit.residual)
+    if fit.gradient is None:
+        gradient = _gradient(core, fit, reference, pair)
+    else:
+        gradient = np.zeros((len(used), len(fit.gradient)))
+        gradient[used] = fit.gradient.T
+    try:
+        return residual_tests(fit.residual, reference, pair.valid, gradient)
+    except FracAccelError:
+        return None
+
+
+def _gradient(core, fit, reference, pair):
+    """Derivatives of the model's output by its parameters, shape (n, p)."""
     # the pair's lag belongs to the stamps, not to the sensor
     delay = fit["delay_s"] - pair.lag_s
     uncertain = UncertainAxis.given(AxisModel(core, (TimeDelay(delay),)), fit.names,
@@ -116,12 +130,8 @@ def judge_residual(core, fit, reference, pair):
     convolution = Convolution(reference - reference[0], pair.sampling_rate_hz, abs(delay))
     s = convolution.s
     response = core.transfer_function(s) * np.exp(-s * delay)
-    gradient = np.stack([convolution.response(response * slope)
-                         for slope in uncertain.slopes(s) if slope.any()], axis=1)
-    try:
-        return residual_tests(fit.residual, reference, pair.valid, gradient)
-    except FracAccelError:
-        return None
+    return np.stack([convolution.response(response * slope)
+                     for slope in uncertain.slopes(s) if slope.any()], axis=1)
 
 
 def band_fits(measured, simulated, sampling_rate_hz, bands):
@@ -139,15 +149,24 @@ def band_fits(measured, simulated, sampling_rate_hz, bands):
     -------
     list of BandFit
     """
-    errors = error_metrics(measured, simulated, sampling_rate_hz, bands)
+    # a tenth at either end, where leakage would count
+    taper = tukey(len(measured), 0.2)
+    error, moving = measured - simulated, measured - measured.mean()
+    # a mean error belongs to the band that begins at zero
+    error = error - (bands[0][0] > 0) * error.mean()
+    left, answer = (np.abs(np.fft.rfft(taper * values))**2 for values in (error, moving))
+    line = np.fft.rfftfreq(len(measured), 1 / sampling_rate_hz)
+    nrmse = [np.sqrt(left[inside].sum() / answer[inside].sum()) if answer[inside].any() else np.nan
+             for low, high in bands for inside in [(line >= low) & (line <= high)]]
     length = max(64, len(measured) // _SEGMENTS)
     floors = [np.nan] * len(bands)
     if len(measured) >= 4 * length:
-        options = {"fs": sampling_rate_hz, "window": "hann", "nperseg": length}
+        predicted, output = (segment_spectra(values, "hann", length)
+                             for values in (simulated, measured))
         # with the prediction, not the reference: what the sensor rings on beyond a segment's end
         # would count as incoherent, and both have it
-        frequency, shared = coherence(simulated, measured, **options)
-        _, power = welch(measured, **options)
+        frequency = np.fft.rfftfreq(length, 1 / sampling_rate_hz)
+        shared, power = coherence_of(predicted, output), power_of(output)
         count = _INDEPENDENT * (2 * len(measured) / length - 1)
         # the coherence of unrelated signals is one over the number of segments
         alone = np.minimum((1 - shared) * count / (count - 1), 1)
@@ -156,8 +175,8 @@ def band_fits(measured, simulated, sampling_rate_hz, bands):
             if inside.any() and power[inside].any():
                 floors[i] = float(np.sqrt(np.sum((alone * power)[inside])
                                           / np.sum(power[inside])))
-    return [BandFit(error.band_hz, error.nrmse, floor)
-            for error, floor in zip(errors.bands, floors)]
+    return [BandFit(tuple(map(float, band)), float(ratio), floor)
+            for band, ratio, floor in zip(bands, nrmse, floors)]
 
 
 def p_words(p_value):

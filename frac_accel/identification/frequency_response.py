@@ -2,7 +2,8 @@
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.signal import csd, welch
+
+from .averaged_spectra import coherence_of, power_of, segment_spectra
 
 _SEGMENTS = 4
 _MOST_BINS = 200
@@ -13,7 +14,8 @@ _SHARE_SEGMENTS = 32
 def bulk_delay(reference, sensor):
     """Whole samples by which the sensor is later than the reference: the correlation's peak."""
     n = len(reference)
-    length = next_fast_len(2 * n, real=True)
+    # room for the lags that are looked at
+    length = next_fast_len(n + n // 4 + 1, real=True)
     shared = irfft(np.conj(rfft(reference - reference.mean(), length))
                    * rfft(sensor - sensor.mean(), length), length)
     lags = np.r_[0:n // 4, -(n // 4):0]
@@ -77,8 +79,7 @@ def linear_share(reference, residual):
     """
     known = np.nan_to_num(residual)
     size = max(16, len(reference) // _SHARE_SEGMENTS)
-    power, left = (welch(values, nperseg=size)[1] for values in (reference, known))
-    shared = np.abs(csd(reference, known, nperseg=size)[1])**2
-    with np.errstate(invalid="ignore"):
-        explained = np.where(power > 1e-9 * power.max(), shared / power, 0.0)
-    return float(explained.sum() / max(left.sum(), 1e-300))
+    moving, left = (segment_spectra(values, "hann", size) for values in (reference, known))
+    power, rest = power_of(moving), power_of(left)
+    explained = np.where(power > 1e-9 * power.max(), coherence_of(moving, left) * rest, 0.0)
+    return float(explained.sum() / max(rest.sum(), 1e-300))

@@ -56,10 +56,15 @@ def local_polynomial_response(reference, sensor, sampling_rate_hz, transient=Tru
     turn = np.exp(2j * np.pi * np.arange(len(x)) * delay / n)
     y = y * turn
     unknowns = (_ORDER + 1) * (2 if transient else 1)
-    edges = _bands(len(x), unknowns + _SPARE)
-    response, variance, factor, power = np.array(
-        [_band(x[first:last], y[first:last], unknowns) for first, last in edges]).T
-    middle = np.array([(first + last - 1) / 2 for first, last in edges])
+    edges = _edges(len(x), unknowns + _SPARE)
+    middle = edges.sum(axis=1) / 2 - 0.5
+    response, variance, factor, power = np.empty((4, len(edges)), complex)
+    widths = np.diff(edges)[:, 0]
+    for width in np.unique(widths):
+        alike = np.flatnonzero(widths == width)
+        place = edges[alike, :1] + np.arange(width)
+        response[alike], variance[alike], factor[alike], power[alike] = \
+            _bands(x[place], y[place], unknowns)
     # noise is smooth over frequency: neighbours make its variance surer
     pooled = np.abs(uniform_filter1d(variance.real, _NEIGHBOURS, mode="nearest"))
     std = np.sqrt(pooled * factor.real / 2)
@@ -71,33 +76,41 @@ def local_polynomial_response(reference, sensor, sampling_rate_hz, transient=Tru
     return frequency[good], (response * shift)[good], std[good]
 
 
-def _bands(count, fewest):
-    """First and last (exclusive) bin of each band, from just above zero frequency."""
+def _edges(count, fewest):
+    """First and last (exclusive) bin of each band, from just above zero frequency, shape (m, 2)."""
     edges, first = [], 1
     while first + fewest <= count:
-        last = min(first + max(fewest, int(_WIDTH * first)), count)
+        width = max(fewest, int(_WIDTH * first))
+        # three leading binary digits: bands of few different widths are worked on together
+        width &= -1 << max(width.bit_length() - 3, 0)
+        last = min(first + max(fewest, width), count)
         edges.append((first, last))
         first = last
-    return edges
+    return np.array(edges, int).reshape(-1, 2)
 
 
-def _band(x, y, unknowns):
-    """Response in the middle, variance of the noise, that of the response over it, and power."""
-    place = np.linspace(-1, 1, len(x))
-    powers = place[:, None] ** np.arange(_ORDER + 1)
-    level = np.sqrt(np.mean(np.abs(x)**2))
-    if level == 0:
-        return 0.0, 0.0, 0.0, 0.0
-    columns = x[:, None] / level * powers
+def _bands(x, y, unknowns):
+    """Of bands, shape (m, bins): response in the middle, variance of the noise, that of the
+    response over it, and power.
+    """
+    place = np.linspace(-1, 1, x.shape[1])
+    powers = (place[:, None] ** np.arange(_ORDER + 1)).astype(complex)
+    level = np.sqrt(np.mean(np.abs(x)**2, axis=1))
+    scale = np.where(level > 0, level, 1.0)
+    columns = (x / scale[:, None])[:, :, None] * powers
     if unknowns > _ORDER + 1:
-        columns = np.concatenate([columns, powers], axis=1)
-    gram = np.conj(columns.T) @ columns
-    # squared condition numbers up to 1e8 leave the normal equations half of their digits
-    values = np.linalg.eigvalsh(gram)
-    if values[0] * _DEPENDENT**2 < values[-1]:
-        return 0.0, 0.0, 0.0, 0.0
+        columns = np.concatenate([columns, np.broadcast_to(powers, columns.shape)], axis=2)
+    across = np.conj(columns.transpose(0, 2, 1))
+    gram = across @ columns
+    gram[level == 0] = np.eye(unknowns)
+    # enough to invert what is singular, too little to change what is not
+    gram += 1e-14 * x.shape[1] * np.eye(unknowns)
     inverse = np.linalg.inv(gram)
-    found = inverse @ (np.conj(columns.T) @ y)
-    residual = y - columns @ found
-    variance = np.sum(np.abs(residual)**2) / (len(x) - unknowns)
-    return found[0] / level, variance, inverse[0, 0].real / level**2, level**2
+    # squared condition numbers up to 1e8 leave the normal equations half of their digits
+    condition = np.linalg.norm(gram, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2))
+    known = (condition <= _DEPENDENT**2) & (level > 0)
+    found = inverse @ (across @ y[:, :, None])
+    residual = y - (columns @ found)[:, :, 0]
+    variance = np.sum(np.abs(residual)**2, axis=1) / (x.shape[1] - unknowns)
+    return [np.where(known, values, 0.0) for values in
+            (found[:, 0, 0] / scale, variance, inverse[:, 0, 0].real / scale**2, level**2)]

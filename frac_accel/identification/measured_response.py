@@ -42,13 +42,18 @@ class MeasuredResponse:
             points, notes = None, [f"no frequency response: {error}"]
         return cls(found, points, notes, pair.sampling_rate_hz)
 
-    def start(self, structure):
-        """Unknowns from which the time domain starts, or None where it finds them itself.
+    @property
+    def stepped(self):
+        """Whether a start in the time domain is in doubt.
 
-        The correlation of sines, on which a start in the time domain rests, has its peak at any
-        whole number of their periods.
+        The correlation of sines, on which it rests, has its peak at any whole number of their
+        periods.
         """
-        if self.excitation.kind != "stepped_sine" or not self._suits(structure):
+        return self.excitation.kind == "stepped_sine"
+
+    def start(self, structure):
+        """Unknowns of a fit to the points from which the time domain can start, or None."""
+        if not (self.stepped or structure.starts_from_points) or not self._suits(structure):
             return None
         try:
             found = fit_response(structure, self.points, self.sampling_rate_hz)

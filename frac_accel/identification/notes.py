@@ -27,12 +27,21 @@ def candidate_notes(parameters, chosen, data, band_hz):
     """
     fit, nrmse, held_out = chosen.fit, chosen.nrmse, chosen.held_out_nrmse
     notes = fit.notes() if isinstance(fit, ArxFit) else [
+        *_bound_notes(chosen),
         *_seismic_notes(parameters, chosen, band_hz[1]),
         *open_combinations(fit, band_hz, data.pair.sampling_rate_hz)]
     if np.isfinite(held_out) and held_out > max(2 * nrmse, 1e-3):
         notes.append(f"held-out data are predicted worse ({held_out:.2%}) than the fitted "
                      f"({nrmse:.2%})")
     return notes
+
+
+def _bound_notes(chosen):
+    """What the search would have taken further than it may go."""
+    reached = {name: fit for fit in chosen.fits for name in fit.at_bounds}
+    return [f"the search ended at the limit of {name}, {fit[name]:.4g}: the data leave it open or "
+            "call for what no such sensor has; its uncertainty holds how far they would go beyond"
+            for name, fit in reached.items()]
 
 
 def _seismic_notes(parameters, chosen, highest):

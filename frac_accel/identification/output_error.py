@@ -1,6 +1,7 @@
 """Output-error fit of a continuous-time model structure to a measured pair, in the time domain."""
 
 import dataclasses
+import functools
 
 import numpy as np
 from scipy.fft import rfft
@@ -9,7 +10,7 @@ from ..convolution import Convolution
 from ..errors import IdentificationError
 from .excitation import strongest_stretch
 from .frequency_response import averaged_response, bulk_delay
-from .uncertainty import sandwich
+from .uncertainty import sandwich, white_noise
 
 # Samples at both ends that the band-limited simulation cannot know, besides the unknown start.
 _EDGE = 32
@@ -48,11 +49,16 @@ class Fit:
         ``sensitivity``, the structure's parameters, ``delay_s``, ``offset``.
     values : ndarray, shape (p,)
     covariance : ndarray, shape (p, p)
-        Allows for a residual that is not white.
+        Allows for a residual that is not white, and for the way that the data would go beyond a
+        bound of the search.
     residual : ndarray, shape (n,)
         Measured less simulated [output units]; NaN where not judged.
     unknowns : ndarray
         Where the search ended, in its own coordinates.
+    at_bounds : tuple of str
+        The structure's parameters with which it ended at a bound of the search.
+    gradient : ndarray, shape (p - 1, m), or None
+        Derivatives of the output by all parameters but the offset, at the m samples that count.
     """
 
     names: tuple
@@ -60,6 +66,8 @@ class Fit:
     covariance: np.ndarray
     residual: np.ndarray
     unknowns: np.ndarray
+    at_bounds: tuple
+    gradient: np.ndarray | None
 
     @property
     def std(self):
@@ -71,12 +79,17 @@ class Fit:
         """RMS of the residual [output units]."""
         return float(np.sqrt(np.nanmean(self.residual**2)))
 
+    @functools.cached_property
+    def noise_std(self):
+        """White part of the residual (`white_noise`)."""
+        return white_noise(self.residual)
+
     def __getitem__(self, name):
         return float(self.values[self.names.index(name)])
 
 
 def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0,
-                     start=None, uncertainty=True):
+                     start=None, uncertainty=True, hint=None, held=None):
     r"""Parameters of a structure, with sensitivity, delay and offset.
 
     Minimises the sum of the squared differences between the measured output and that simulated
@@ -104,6 +117,10 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
         `Fit.unknowns` of a fit of the same structure to start from, instead of the grid.
     uncertainty : bool
         Whether the covariance is wanted; NaN otherwise.
+    hint : ndarray, optional
+        Unknowns to start from besides the grid's best.
+    held : dict of int to float, optional
+        Values of unknowns that are known, by place; they get no variance. With `start` only.
 
     Returns
     -------
@@ -119,18 +136,18 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
         part = strongest_stretch(reference, _START_LENGTH, valid)
         rough = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
                          None if valid is None else valid[part], lag_s)
-        state = rough.solve(rough.starts())
+        state = rough.solve(rough.starts() if hint is None else [hint, *rough.starts()])
         if rough.n == len(sensor):
             return rough.result(state, uncertainty)
         start = state.theta
-    problem = _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s)
+    problem = _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s, held)
     return problem.result(problem.solve([start]), uncertainty)
 
 
 class _Problem:
     """Unknowns of the search: the structure's own and the delay in samples."""
 
-    def __init__(self, structure, reference, sensor, rate, valid, lag_s):
+    def __init__(self, structure, reference, sensor, rate, valid, lag_s, held=None):
         self.structure, self.rate, self.lag_s = structure, rate, lag_s
         self.n = len(sensor)
         # the usual level is taken as steady before the record (its response is a constant), with
@@ -153,6 +170,8 @@ class _Problem:
         self.reference, self.whole = reference, sensor
         low, high = structure.bounds(rate, self.n)
         self.low, self.high = np.r_[low, -self.n / 4], np.r_[high, self.n / 4]
+        for place, value in (held or {}).items():
+            self.low[place] = self.high[place] = value
 
     def solve(self, starts):
         """State with the least cost that a search from one of the starts ends in."""
@@ -191,19 +210,21 @@ class _Problem:
         # neighbours in frequency end in the same place; other dampings may not
         kinds = np.c_[np.round(grid[:, 0], 1), np.round(grid[:, 1:], 3)].tolist()
         groups = grid[:, held].tolist()
+        most = self.structure.starting_points * len(set(map(tuple, groups)))
         for point in np.argsort(explained)[::-1]:
             kind = tuple(kinds[point])
             group = seen.setdefault(tuple(groups[point]), set())
             if kind not in group and len(group) < self.structure.starting_points:
                 group.add(kind)
-                chosen.append(np.r_[grid[point], delays[best_delay[point]]])
-        model = _AveragedResponse(self.structure, s, prepared, response, np.sqrt(weight), self)
-        costs, improved = model.improve(np.array(chosen))
+                chosen.append([*grid[point], delays[best_delay[point]]])
+                if len(chosen) == most:
+                    break
         # half a period of the resonance, with the other polarity, looks much the same
         half = np.r_[np.zeros(len(held)), self.rate / (2 * peak)]
-        best = improved[np.argmin(costs)]
-        further, others = model.improve(np.array([best - half, best + half]))
-        costs, improved = np.r_[costs, further], np.r_[improved, others]
+        chosen = np.array(chosen)
+        chosen = np.concatenate([chosen, [chosen[0] - half, chosen[0] + half]])
+        model = _AveragedResponse(self.structure, s, prepared, response, np.sqrt(weight), self)
+        costs, improved = model.improve(chosen)
         lag = bulk + self.lag_s * self.rate
         starts = []
         for place in np.argsort(costs):
@@ -222,7 +243,8 @@ class _Problem:
         own, delay = theta[:-1], theta[-1] / self.rate - self.lag_s
         response, slopes = self.structure.gradient(self.prepared, own)
         spectra = np.array([response, *slopes, response * (-self.convolution.s / self.rate)])
-        spectra *= np.exp(-self.convolution.s * delay)
+        s = self.convolution.s
+        spectra *= _exponential(-s[0] * delay, -(s[1] - s[0]) * delay, len(s))
         simulated = self.convolution.response(spectra)[:, _WAY:][:, self.judged]
         # one that is over long before the first used sample is none
         decays = [np.exp(-rate * self.instants)
@@ -230,7 +252,7 @@ class _Problem:
                   if -rate * self.instants[0] > _OVER]
         pole, pole_slopes = self.structure.mode(own)
         rings = pole is not None and pole.real * self.instants[0] > _OVER
-        swing = np.exp(pole * self.instants) if rings else None
+        swing = _exponential(0.0, pole / self.rate, self.n)[self.judged] if rings else None
         free = [swing.real, swing.imag, *decays] if rings else decays
         rows = np.array([simulated[0], np.ones(len(self.sensor)), *free, *simulated[1:]])
         return rows, 2 + len(free), swing, pole_slopes
@@ -303,7 +325,8 @@ class _Problem:
         linear = _solve(known @ known.T + faint, known @ self.sensor)
         residual = self.sensor - linear @ known
         noise = residual @ residual / len(residual)
-        if swing is not None and np.sum((linear[2:4] @ known[2:4])**2) > _FEIGNED * noise:
+        real = swing is not None and np.sum((linear[2:4] @ known[2:4])**2) > _FEIGNED * noise
+        if real:
             # with the pole, what it left behind changes as well; what noise feigns of it does not
             change = (linear[2] - 1j * linear[3]) / linear[0] * self.instants * swing
             rows[count:-1] += np.outer(pole_slopes.real, change.real)
@@ -311,13 +334,15 @@ class _Problem:
         gram, right = rows @ rows.T, rows @ self.sensor
         gram[:count, :count] += faint
         cost = residual @ residual + linear @ faint @ linear
-        return _State(theta, float(cost), linear, rows, residual, gram, right)
+        return _State(theta, float(cost), linear, rows, residual, gram, right,
+                      swing, real)
 
     def require_relation(self, explained):
         if explained < min(_CHANCE / self.independent(), 0.5):
             raise IdentificationError(
                 "the sensor's output has nothing to do with the reference: the best model explains "
-                f"{max(explained, 0):.2%} of its power, which chance alone can do")
+                f"{max(explained, 0):.2%} of its power, which chance alone can do; were both "
+                "recorded at the same time, with stamps of one clock?")
 
     def independent(self):
         """Number of independent frequencies that reference and sensor have in common."""
@@ -332,6 +357,9 @@ class _Problem:
         own, factors = self.structure.physical(theta[:-1])
         names = ("sensitivity", *self.structure.names, "delay_s", "offset")
         covariance = np.full((len(names), len(names)), np.nan)
+        held = self.low == self.high
+        stuck = ((theta <= self.low) | (theta >= self.high)) & ~held
+        gradient = None
         if uncertainty:
             jacobian = state.rows.copy()
             # the offset is what remains with the whole reference, not with the part that moves
@@ -340,19 +368,37 @@ class _Problem:
             jacobian[count:-1] = np.linalg.solve(factors.T, jacobian[count:-1])
             jacobian[-1] *= self.rate
             # sensitivity, structure, delay, offset, free motions
-            order = [0, *range(count, len(jacobian)), *range(1, count)]
-            covariance = sandwich(jacobian[order].T, state.residual, self.used)
-            covariance = covariance[:len(names), :len(names)]
+            gradient = jacobian[[0, *range(count, len(jacobian))]]
+            order = [0, *(count + np.flatnonzero(~held)), *range(1, count)]
+            jacobian = jacobian[order]
+            if state.swing is not None and (stuck.any() or not state.real):
+                # what noise, or a tone that never decays, can feign of a swing tells no frequency
+                longer = self.instants * state.swing
+                jacobian = np.concatenate([jacobian, [longer.real, longer.imag]])
+            free = np.flatnonzero(np.r_[True, ~held, True])
+            within = sandwich(jacobian.T, state.residual, self.used)
+            if stuck.any():
+                # the bound is ours, not the sensor's: how far the data would go is not known better
+                gram, right = jacobian @ jacobian.T, jacobian @ state.residual
+                beyond = _solve(gram, right)
+                within += np.outer(beyond, beyond)
+            covariance = np.zeros_like(covariance)
+            covariance[np.ix_(free, free)] = within[:len(free), :len(free)]
         full = np.full(self.n, np.nan)
         full[self.used] = state.residual
         offset = linear[1] - linear[0] * self.level
         values = np.r_[linear[0], own, theta[-1] / self.rate, offset]
-        return Fit(names, values, covariance, full, theta)
+        at_bounds = tuple(name for name, here in zip((*self.structure.names, "delay_s"), stuck)
+                          if here)
+        return Fit(names, values, covariance, full, theta, at_bounds, gradient)
 
 
 @dataclasses.dataclass(frozen=True)
 class _State:
-    """A place in the search: rows as in `_Problem.rows`, the first of them with coefficients."""
+    """A place in the search: rows as in `_Problem.rows`, the first of them with coefficients.
+
+    Besides, the free swing, and whether it is more than noise could feign.
+    """
 
     theta: np.ndarray
     cost: float
@@ -361,6 +407,8 @@ class _State:
     residual: np.ndarray
     gram: np.ndarray
     right: np.ndarray
+    swing: np.ndarray | None
+    real: bool
     converged: bool = False
 
     def reduced(self):
@@ -423,6 +471,13 @@ class _AveragedResponse:
         rows[:, 1:] *= gain[:, None, None]
         return (np.einsum("mf,mf->m", error, error), rows @ rows.transpose(0, 2, 1),
                 np.einsum("mpf,mf->mp", rows, error))
+
+
+def _exponential(first, step, count):
+    """exp(first + step k), k = 0 ... count - 1, as products of few exponentials."""
+    inner = int(np.sqrt(count)) + 1
+    outer = np.exp(first + step * inner * np.arange(-(-count // inner)))
+    return np.outer(outer, np.exp(step * np.arange(inner))).ravel()[:count]
 
 
 def _real(values):

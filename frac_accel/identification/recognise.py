@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import hilbert
 
@@ -112,25 +113,36 @@ def _one_short_event(moving):
 
 
 def _tones(moving, rate):
-    """Stretches in which the phase is a straight line, and the energy in them."""
+    """Stretches in which the phase is a straight line, and the energy in them.
+
+    None where they hold too little of it to matter.
+    """
     n = len(moving)
     analytic = hilbert(moving, next_fast_len(n))[:n]
     size = max(4, n // _BLOCKS)
     count = n // size
     phase = np.unwrap(np.angle(analytic))[:count * size].reshape(count, size).mean(axis=1)
-    tones, energy, first = [], 0.0, 0
-    while first + _FEWEST_BLOCKS <= count:
-        last = _straight_until(phase, first)
-        if last == first:
-            first += 1
-            continue
-        slope = np.polyfit(np.arange(first, last), phase[first:last], 1)[0]
+    # most of noise is no longer straight than this: all of it at once
+    short = {length: _straight(sliding_window_view(phase, length))
+             for length in range(_FEWEST_BLOCKS, 2 * _FEWEST_BLOCKS + 1) if length <= count}
+    stretches, first = [], 0
+    for begin in np.flatnonzero(short[_FEWEST_BLOCKS]).tolist() if short else ():
+        if begin >= first:
+            first = _straight_until(phase, begin, short)
+            stretches.append((begin, first))
+    before = np.r_[0.0, np.cumsum(moving**2)]
+    if sum(before[last * size] - before[begin * size] for begin, last in stretches) \
+            < _TONAL * before[-1]:
+        return [], 0.0
+    tones, energy = [], 0.0
+    for begin, last in stretches:
+        place = np.arange(last - begin) - (last - begin - 1) / 2
+        slope = place @ phase[begin:last] / (place @ place)
         frequency = abs(slope) * rate / (2 * np.pi * size)
-        tone = Tone(first * size, last * size, float(frequency))
+        tone = Tone(begin * size, last * size, float(frequency))
         if _is_sine(analytic[tone.start:tone.stop], tone, rate, size):
             tones.append(tone)
             energy += float(np.sum(moving[tone.start:tone.stop]**2))
-        first = last
     return _without_transitions(tones, moving), energy
 
 
@@ -146,17 +158,23 @@ def _without_transitions(tones, moving):
             if not (lesser(length, place) and lesser(level, place))]
 
 
-def _straight_until(phase, first):
-    """End of the longest straight stretch from one block on; `first` if there is none."""
+def _straight(phases):
+    """Whether phases, shape (..., blocks), lie on straight lines."""
+    place = np.arange(phases.shape[-1]) - (phases.shape[-1] - 1) / 2
+    rest = (phases - phases.mean(axis=-1, keepdims=True)
+            - (phases @ place / (place @ place))[..., None] * place)
+    return np.max(np.abs(rest), axis=-1) < _STRAIGHT
+
+
+def _straight_until(phase, first, short):
+    """End of the longest straight stretch from one block on, at which there is one.
+
+    `short` tells for short lengths at which blocks stretches begin.
+    """
     def straight(length):
-        part = phase[first:first + length]
-        place = np.arange(length) - (length - 1) / 2
-        rest = part - part.mean() - place * (place @ part) / (place @ place)
-        return np.max(np.abs(rest)) < _STRAIGHT
+        return short[length][first] if length in short else _straight(phase[first:first + length])
 
     most = len(phase) - first
-    if not straight(_FEWEST_BLOCKS):
-        return first
     good, bad = _FEWEST_BLOCKS, 2 * _FEWEST_BLOCKS
     while bad <= most and straight(bad):
         good, bad = bad, 2 * bad

@@ -33,6 +33,8 @@ _JUMP = 0.3
 _CLIPPED_SENSOR = 0.3
 _CLIPPED_REFERENCE = 1e-3
 _LEFT = 0.1
+# Sizes of which the squares of squares are still numbers; no unit leads out of here.
+_SMALLEST, _LARGEST = 1e-30, 1e30
 
 
 @dataclasses.dataclass(frozen=True)
@@ -88,6 +90,25 @@ def check_record(pair, axis="x"):
                        notes + standing_notes + clipping_notes)
 
 
+def require_magnitude(pair, axis="x"):
+    """Refuse values of a size that no acceleration has in any unit.
+
+    Raises
+    ------
+    IdentificationError
+        Naming the topic and its largest value.
+    """
+    for name in ("reference", "sensor"):
+        values = getattr(pair, name)
+        largest = max(values.max(), -values.min())
+        moved = np.ptp(values[:, AXES.index(axis)])
+        if largest >= _LARGEST or 0 < moved <= _SMALLEST:
+            words = f"go up to {largest:.3g}" if largest >= _LARGEST else f"vary by {moved:.3g}"
+            raise IdentificationError(
+                f"the {name}'s values {words}, expected something between {_SMALLEST:g} and "
+                f"{_LARGEST:g}: no unit of acceleration makes them so; is the topic corrupt?")
+
+
 def _require_no_copy(reference, sensor, valid):
     delay = bulk_delay(reference, sensor)
     n = len(sensor) - abs(delay)
@@ -136,7 +157,7 @@ def _dependent(values):
     excited = _excited(values)
     if len(excited) < 2:
         return ""
-    strength, direction = np.linalg.eigh(np.corrcoef(values[:, excited].T))
+    strength, direction = np.linalg.eigh(np.corrcoef(np.ascontiguousarray(values[:, excited].T)))
     if strength[0] > _COLLINEAR:
         return ""
     dependent = np.any(np.abs(direction[:, strength <= _COLLINEAR]) > 0.1, axis=1)
@@ -144,7 +165,7 @@ def _dependent(values):
 
 
 def _excited(values):
-    spread = np.std(values, axis=0)
+    spread = np.std(np.ascontiguousarray(values.T), axis=1)
     return np.flatnonzero(spread > 1e-6 * spread.max())
 
 

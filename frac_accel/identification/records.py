@@ -79,6 +79,8 @@ class RecordAgreement:
         In standard uncertainties of the difference.
     complete : bool
         Whether no record's own residual depends on its reference.
+    held : tuple of str
+        Parameters that a record leaves open, taken as equal in all to compare the others.
     """
 
     records: tuple
@@ -95,6 +97,7 @@ class RecordAgreement:
     worst_records: tuple
     worst_difference: float
     complete: bool
+    held: tuple
 
     @property
     def agree(self):
@@ -106,6 +109,8 @@ class RecordAgreement:
         if self.agree:
             agreed = f"the {len(self.records)} records agree on the parameters " \
                      f"({p_words(self.p_value)})"
+            if self.held:
+                agreed += f" with the same {' and '.join(self.held)}, which they leave open"
             own = np.diag(self.nrmse)
             model, judged = np.unravel_index(np.nanargmax(self.nrmse / own), self.nrmse.shape)
             if self.nrmse[model, judged] > _PREDICTED_WORSE * own[judged]:
@@ -144,10 +149,8 @@ def combine(fits):
     names = fits[0].names
     estimated = np.all([fit.std > 0 for fit in fits], axis=0)
     # far from linear: such a covariance would call records of one sensor different
-    is_open = np.array([name in _POSITIVE and any(fit.std[i] > _OPEN * fit.values[i]
-                                                  for fit in fits)
-                        for i, name in enumerate(names)])
-    shared = estimated & ~is_open & [name not in _OWN_TO_EACH_RECORD for name in names]
+    opened = np.array([is_open(name, fits) for name in names])
+    shared = estimated & ~opened & [name not in _OWN_TO_EACH_RECORD for name in names]
     free = [_unbounded(names, fit.values) for fit in fits]
     points = [point for point, _ in free]
     spreads = [fit.covariance * np.outer(slope, slope) for fit, (_, slope) in zip(fits, free)]
@@ -160,7 +163,7 @@ def combine(fits):
     birge = float(np.sqrt(statistic / freedom)) if disagree else 1.0
     mean, spread = points[0].copy(), np.zeros_like(spreads[0])
     place = np.ix_(estimated, estimated)
-    mean_of = _separate_means if disagree or is_open.any() else _weighted_mean
+    mean_of = _separate_means if disagree or opened.any() else _weighted_mean
     mean[estimated], spread[place] = mean_of(
         [point[estimated] for point in points], [matrix[place] for matrix in spreads])
     values, slope = _bounded(names, mean)
@@ -168,9 +171,44 @@ def combine(fits):
     return Combination(values, covariance * birge**2, statistic, freedom, p_value, birge)
 
 
-def agreement(names, fits, combination, nrmse, combined_nrmse, complete):
-    """RecordAgreement of the fits of named records; parameters as its attributes."""
+def is_open(name, fits):
+    """Whether one of the fits leaves a frequency or a damping open."""
+    if name not in _POSITIVE or name not in fits[0].names:
+        return False
+    place = fits[0].names.index(name)
+    return any(fit.std[place] > _OPEN * fit.values[place] for fit in fits)
+
+
+def freed(combination, fits, held):
+    """Combination of fits with held parameters, with the uncertainty that these bring.
+
+    Parameters
+    ----------
+    combination : Combination
+        Of fits in which each held parameter has one value.
+    fits : sequence of Fit
+        In which all are free.
+    held : dict of str to Fit
+        Held parameters, and the fits that they have their values from: their covariances say how
+        uncertain these are, and how the other parameters go with them.
+    """
+    covariance = combination.covariance.copy()
+    for name, fit in held.items():
+        along = fit.covariance[:, fit.names.index(name)]
+        covariance += np.outer(along, along) / along[fit.names.index(name)]
+    return dataclasses.replace(combination, covariance=covariance)
+
+
+def agreement(names, fits, combination, nrmse, combined_nrmse, complete, compared=None, held=()):
+    """RecordAgreement of the fits of named records; parameters as its attributes.
+
+    `compared` are the fits that tell which parameter differs most, with the `held` parameters.
+    """
     values, std = (np.stack([getattr(fit, part) for fit in fits]) for part in ("values", "std"))
+    own, own_std = values, std
+    if compared is not None:
+        values, std = (np.stack([getattr(fit, part) for fit in compared])
+                       for part in ("values", "std"))
     shared = [i for i, name in enumerate(fits[0].names)
               if name not in _OWN_TO_EACH_RECORD and np.all(std[:, i] > 0)]
     worst = max((abs(values[a, i] - values[b, i]) / np.hypot(std[a, i], std[b, i]), i, a, b)
@@ -178,9 +216,9 @@ def agreement(names, fits, combination, nrmse, combined_nrmse, complete):
     difference, parameter, second, first = worst
     return RecordAgreement(
         tuple(names), np.asarray(nrmse, float), np.asarray(combined_nrmse, float), fits[0].names,
-        values, std, combination.statistic, combination.freedom, combination.p_value,
+        own, own_std, combination.statistic, combination.freedom, combination.p_value,
         combination.birge_factor, fits[0].names[parameter], (names[first], names[second]),
-        float(difference), bool(complete))
+        float(difference), bool(complete), tuple(held))
 
 
 def _separate_means(values, covariances):

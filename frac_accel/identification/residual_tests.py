@@ -215,6 +215,10 @@ def _moments(error, reference, used, lags, gradient, noise):
     denominator, variance = noise
     others = np.ones((n, 1)) if gradient is None else np.c_[np.ones(n), gradient]
     others = others / np.maximum(np.max(np.abs(others), axis=0), 1e-300)
+    edges = _edges(used)
+    if len(denominator) == 1 and len(edges) == 2:
+        gram, right = _white_moments(error, reference, edges, lags, others)
+        return gram, variance * gram, right
     width = len(lags) + others.shape[1]
     gram, coloured, right = np.zeros((width, width)), np.zeros((width, width)), np.zeros(width)
     reach = lags[-1]
@@ -241,28 +245,62 @@ def _moments(error, reference, used, lags, gradient, noise):
     return gram, variance * (coloured if len(denominator) > 1 else gram), right
 
 
+def _edges(used):
+    """Where used samples begin and end, in turn."""
+    return np.flatnonzero(np.diff(used, prepend=False, append=False))
+
+
+def _white_moments(error, reference, edges, lags, others):
+    """X'X and X'error of one stretch, from `edges[0]` to `edges[1]`, without building X.
+
+    Of the reference at two lags, the product differs from that at both lags one longer by the
+    samples at the ends.
+    """
+    start, stop = edges
+    count, reach = len(lags), lags[-1] + 1
+    padded = np.r_[np.zeros(reach), reference, np.zeros(reach)]
+
+    def shifted(lag):
+        return padded[reach - lag + start:reach - lag + stop]
+    rows = np.concatenate([others[start:stop].T, [error[start:stop], shifted(lags[0])]])
+    across = np.array([rows @ shifted(lag) for lag in lags])
+    gram = np.empty((count + others.shape[1],) * 2)
+    before, last = (padded[reach - lags + place - 1] for place in edges)
+    change = np.outer(before, before) - np.outer(last, last)
+    gram[0, :count] = gram[:count, 0] = across[:, -1]
+    for i in range(1, count):
+        gram[i, 1:count] = gram[i - 1, :count - 1] + change[i - 1, :-1]
+    gram[:count, count:], gram[count:, :count] = across[:, :-2], across[:, :-2].T
+    gram[count:, count:] = rows[:-2] @ rows[:-2].T
+    return gram, np.r_[across[:, -2], rows[:-2] @ rows[-2]]
+
+
 def _autocovariance(error, used, most):
     """Autocovariance from the pairs of samples that exist, and their numbers; lags 0 ... most."""
     n = len(error)
     present = used.astype(float)
-    pairs = np.array([present[lag:] @ present[:n - lag] for lag in range(most + 1)])
+    if len(_edges(used)) == 2:
+        pairs = used.sum() - np.arange(most + 1.0)
+    else:
+        pairs = np.array([present[lag:] @ present[:n - lag] for lag in range(most + 1)])
     sums = np.array([error[lag:] @ error[:n - lag] for lag in range(most + 1)])
     return sums / np.maximum(pairs, 1), pairs
 
 
 def _noise_model(covariance, count):
     """Denominator A(z) and innovation variance of an autoregressive model (Levinson-Durbin)."""
-    denominator, variance = np.ones(1), covariance[0]
-    best = (count * np.log(variance), denominator, variance)
+    denominator, variance = np.zeros(_HIGHEST_ORDER + 1), covariance[0]
+    denominator[0] = 1.0
+    best = count * np.log(variance), 0, denominator.copy(), variance
     for order in range(1, _HIGHEST_ORDER + 1):
-        reflection = -(denominator @ covariance[order:0:-1]) / variance
+        reflection = -(denominator[:order] @ covariance[order:0:-1]) / variance
         if not abs(reflection) < 1:
             # pairs around missing samples need not belong to any process: the smaller order will do
             break
-        extended = np.r_[denominator, 0.0]
-        denominator = extended + reflection * extended[::-1]
+        denominator[:order + 1] += reflection * denominator[order::-1]
         variance *= 1 - reflection**2
         criterion = count * np.log(variance) + 2 * order
         if criterion < best[0]:
-            best = (criterion, denominator, variance)
-    return best[1], best[2]
+            best = criterion, order, denominator.copy(), variance
+    _, order, denominator, variance = best
+    return denominator[:order + 1], variance

@@ -15,7 +15,6 @@ from .excitation import Excitation
 from .fit_validation import FitValidation, fit_validation, judge_residual
 from .notes import candidate_notes
 from .points import ResponsePoints
-from .uncertainty import white_noise
 
 # Standard uncertainties from which on the model has an offset.
 _SIGNIFICANT = 3.0
@@ -106,7 +105,7 @@ def identification(chosen, reason, datas, records, axis, provenance, agreeing=No
     fit, data = chosen.fit, datas[0]
     rate = data.pair.sampling_rate_hz
     doubts = [(data.record.notes + suspicions(own, data)) for own, data in zip(chosen.fits, datas)]
-    excitation = Excitation.of(data.record, data.reference, data.sensor,
+    excitation = Excitation.of(data.record, data.reference, data.sensor, data.order,
                                needed_order(chosen.structure), data.response.excitation)
     parameters = {name: {"value": float(value), "std": float(std), "unit": _unit(name)}
                   for name, value, std in zip(fit.names, fit.values, fit.std)}
@@ -127,7 +126,7 @@ def identification(chosen, reason, datas, records, axis, provenance, agreeing=No
         "covariance": {"parameters": list(fit.names), "matrix": fit.covariance.tolist()},
         "band_hz": list(excitation.band_hz),
         "sampling_rate_hz": rate,
-        "noise_std": white_noise(fit.residual),
+        "noise_std": fit.noise_std,
         "provenance": {"axis": axis, "structure": chosen.name, "reason": reason, **provenance},
         "validation": {"nrmse": chosen.nrmse, "held_out_nrmse": chosen.held_out_nrmse,
                        "notes": notes, **validation.essentials()},

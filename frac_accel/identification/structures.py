@@ -11,6 +11,7 @@ _DAMPINGS = (0.02, 0.08, 0.25, 0.7, 1.5)
 _ORDERS = (0.4, 0.7, 1.0, 1.3, 1.6)
 _INERTIA_ORDER, _HIGHEST_DAMPING_ORDER = 1.95, 1.45
 _SLOPE_RATIO, _SLOPE_ORDER = 0.05, 0.6
+_DECAYS = 8
 
 
 class OscillatorStructure:
@@ -22,6 +23,8 @@ class OscillatorStructure:
     starting_points = 8
     trials = 2
     searches = 1
+    # whether a fit to the points of the frequency response is one more start
+    starts_from_points = False
 
     def prepare(self, s):
         """What the response needs of the complex frequencies `s`, once."""
@@ -147,8 +150,8 @@ class FractionalStructure(OscillatorStructure):
                            np.zeros(len(self.names))][:len(self.names)]
 
     def decay_rates(self, theta, duration_s):
-        # the algebraic tail of the branch cut, as a few decays over the length of the record
-        return np.geomspace(2 / duration_s, 2 * np.pi * np.exp(theta[0]), 4)
+        # the algebraic tail of the branch cut: so many decays leave less than 1e-4 of the output
+        return np.geomspace(1 / duration_s, 2 * np.pi * np.exp(theta[0]), _DECAYS)
 
     def core(self, fit):
         return Oscillator(natural_frequency_hz=fit["natural_frequency_hz"],
@@ -166,6 +169,7 @@ class PlainTransferFunctionStructure(FractionalStructure):
 
     names = (*FractionalStructure.names, "inertia_order")
     held = ("damping_order", "inertia_order")
+    starts_from_points = True
 
     def gradient(self, prepared, theta):
         natural, factors = _natural(theta)

@@ -4,6 +4,9 @@ import numpy as np
 from scipy.fft import next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
+# Padding of the spectra, in roots of the record.
+_REACH = 12
+
 
 def sandwich(jacobian, residual, used):
     r"""Covariance :math:`(J^T J)^{-1} J^T \Gamma J (J^T J)^{-1}`.
@@ -28,17 +31,18 @@ def sandwich(jacobian, residual, used):
     full = np.zeros((len(scaled) + 1, len(used)))
     full[:-1, used] = scaled
     full[-1, used] = residual
-    length = next_fast_len(2 * len(used), real=True)
+    # the smoothed spectrum reaches over lags of a few times the root of the record
+    length = next_fast_len(len(used) + int(_REACH * np.sqrt(len(used))), real=True)
     spectra = rfft(full, length, axis=1)
-    power = np.abs(spectra[-1])**2 / len(residual)
-    width = max(5, int(np.sqrt(len(power))))
+    power = (spectra[-1].real**2 + spectra[-1].imag**2) / len(residual)
+    width = max(5, int(len(power) / np.sqrt(len(used))))
     smooth = uniform_filter1d(power, width, mode="reflect")
     twice = np.full(len(power), 2.0)
     twice[0] = 1.0
     if length % 2 == 0:
         twice[-1] = 1.0
-    weighted = spectra[:-1] * np.sqrt(twice * smooth)
-    meat = np.real(np.conj(weighted) @ weighted.T) / length
+    weighted = (spectra[:-1] * np.sqrt(twice * smooth)).view(float)
+    meat = weighted @ weighted.T / length
     values, vectors = np.linalg.eigh(scaled @ scaled.T)
     bread = (vectors / np.maximum(values, 1e-14 * values[-1])) @ vectors.T
     # as a square, so that rounding makes no variance negative
@@ -54,7 +58,8 @@ def white_noise(residual):
     Below, the residual also holds what the model gets wrong, which is not noise.
     """
     clean = np.nan_to_num(residual)
-    power = np.abs(np.fft.rfft(clean * np.hanning(len(clean))))**2
-    window = np.sum(np.hanning(len(clean))**2)
+    taper = np.hanning(len(clean))
+    power = np.abs(rfft(clean * taper))**2
+    window = taper @ taper
     # the median of a chi-squared of two degrees is ln 2 of its mean
     return float(np.sqrt(np.median(power[len(power) // 2:]) / np.log(2) / window))

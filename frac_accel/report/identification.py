@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.signal import coherence, welch
 
+from ..errors import ModelError
 from ..identification.excitation import strongest_stretch
 from ..model import AXES
 from ..uncertainty import response_uncertainty
@@ -138,17 +139,20 @@ def _response(section, result, axis):
     frequency = np.geomspace(min(lowest, points.frequency_hz[0]) if points else lowest,
                              max(high, points.frequency_hz[-1]) if points else high, _FREQUENCIES)
     curve, method = _curve(model, frequency, axis)
+    certain = curve.amplitude_interval is not None
+    interval = (f", its 95 % interval from the uncertainty of the parameters ({method})" if certain
+                else f" without an interval: {method}")
     modelled = model.frequency_response(points.frequency_hz, axis) if points else None
 
     def add(figure, caption):
         section.figure(figures.mark_band(figure, (low, high)), caption)
     add(figures.bode(curve, points, modelled),
-        "Frequency response of the model, its 95 % interval from the uncertainty of the "
-        f"parameters ({method})" + (_measured(points) if points else ".")
+        f"Frequency response of the model{interval}" + (_measured(points) if points else ".")
         + f" Beyond the dashed lines, {low:.4g} Hz and {high:.4g} Hz, the model is extrapolated.")
-    add(figures.response_interval(curve),
-        "Expanded uncertainty (k = 2, 95 %) that the parameters give the model's amplitude and "
-        "phase. What the model leaves out is not in it: see the residual.")
+    if certain:
+        add(figures.response_interval(curve),
+            "Expanded uncertainty (k = 2, 95 %) that the parameters give the model's amplitude and "
+            "phase. What the model leaves out is not in it: see the residual.")
     if not points:
         return
     add(figures.response_deviation(curve, points, modelled),
@@ -254,8 +258,15 @@ def _records(section, records):
 
 
 def _curve(model, frequency_hz, axis):
-    """The model's response with the interval that the parameters' uncertainty gives it."""
-    known = response_uncertainty(model, frequency_hz, axis)
+    """The model's response with the interval that the parameters' uncertainty gives it, and how.
+
+    Without interval, and why, where parameters that the data leave open give none.
+    """
+    try:
+        known = response_uncertainty(model, frequency_hz, axis)
+    except ModelError as error:
+        return figures.ResponseCurve(frequency_hz, model.frequency_response(frequency_hz, axis),
+                                     None, None), str(error)
     around = known.phase_interval_deg - known.phase_deg[:, None]
     return figures.ResponseCurve(
         frequency_hz, model.frequency_response(frequency_hz, axis),
