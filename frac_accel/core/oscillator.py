@@ -62,3 +62,16 @@ class Oscillator:
 
     def require_stable(self, where):
         """Positive damping of an order between 0 and 2 is stable, whatever its value."""
+
+
+def tail_rates(natural_frequency_hz, duration_s):
+    """Rates [1/s] of the decays that stand for a fractional sensor's memory of earlier motion.
+
+    The contribution of the branch cut falls off algebraically; so many exponentials leave less than
+    1e-4 of the output of it.
+
+    Returns
+    -------
+    ndarray, shape (8,)
+    """
+    return np.geomspace(1 / duration_s, 2 * np.pi * natural_frequency_hz, 8)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.oscillator import tail_rates
 from ..effects.base import CROSS_AXIS, GAIN, Effect
 from ..effects.time_delay import TimeDelay
 from ..errors import FracAccelError
@@ -211,7 +212,7 @@ class Problem:
         core = self.axis_model(effects).effective_core
         rates = []
         if getattr(core, "damping_order", 1.0) != 1.0:
-            rates = np.geomspace(2 / self.time[-1], 2 * np.pi * core.natural_frequency_hz, 4)
+            rates = tail_rates(core.natural_frequency_hz, self.time[-1])
         return self._decays([*(-rate + 0j for rate in rates), *poles])
 
     def own_motions(self, effect):
@@ -223,7 +224,7 @@ class Problem:
     def _decays(self, poles):
         columns = []
         for pole in poles:
-            if pole.imag < 0 or -pole.real * self.time[-1] < 1:
+            if pole.imag < 0 or -pole.real * self.time[-1] < 0.999:
                 continue
             decay = np.exp(np.maximum(pole.real * self.time, -60))
             turn = pole.imag * self.time

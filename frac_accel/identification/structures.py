@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..core import Oscillator
+from ..core.oscillator import tail_rates
 from ..core.principal_sheet import fractional_root
 from ..core.sensor_form import from_sensor_parameters
 
@@ -11,7 +12,6 @@ _DAMPINGS = (0.02, 0.08, 0.25, 0.7, 1.5)
 _ORDERS = (0.4, 0.7, 1.0, 1.3, 1.6)
 _INERTIA_ORDER, _HIGHEST_DAMPING_ORDER = 1.95, 1.45
 _SLOPE_RATIO, _SLOPE_ORDER = 0.05, 0.6
-_DECAYS = 8
 
 
 class OscillatorStructure:
@@ -150,8 +150,7 @@ class FractionalStructure(OscillatorStructure):
                            np.zeros(len(self.names))][:len(self.names)]
 
     def decay_rates(self, theta, duration_s):
-        # the algebraic tail of the branch cut: so many decays leave less than 1e-4 of the output
-        return np.geomspace(1 / duration_s, 2 * np.pi * np.exp(theta[0]), _DECAYS)
+        return tail_rates(np.exp(theta[0]), duration_s)
 
     def core(self, fit):
         return Oscillator(natural_frequency_hz=fit["natural_frequency_hz"],
