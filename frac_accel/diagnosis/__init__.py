@@ -12,6 +12,7 @@ from ..identification.excitation import learning_length, require_excitation
 from ..identification.record_checks import moving_samples
 from ..model import AXES, SensorModel
 from ..pair import Pair
+from ..simulation import AxisSimulator
 from . import integrity
 from .engine import Engine
 from .judgement import Diagnosis, Finding, Loose, insufficient, judge
@@ -23,6 +24,10 @@ __all__ = ["Diagnosis", "Finding", "diagnose"]
 _FEWEST = 512
 # Coefficients of a classical core with its delay: what the excitation must at least be good for.
 _COEFFICIENTS = 4
+# Share of its power in which a signal must follow the model the wrong way round, and the share of
+# what is left the right way round that may be left then, for the pair to count as exchanged.
+_ALIKE = 0.5
+_EXCHANGED = 0.3
 # Parameters of a classical core.
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
@@ -162,6 +167,7 @@ def _require_relation(engine, axis, seed):
     """Refuse a sensor that does not follow the reference."""
     p = engine.problem
     start = p.simulate({**engine.search.base, **(seed or {})})
+    _require_direction(engine, axis, start)
     follows, share = related(p.measured, start, p.used)
     if follows:
         return
@@ -174,3 +180,24 @@ def _require_relation(engine, axis, seed):
                 hint = f"; it follows the reference's {AXES[other]}: the axes are exchanged"
     raise FracAccelError(f"axis {axis}: the sensor does not follow the reference (they share "
                          f"{max(share, 0):.2%} of the power); they do not belong together{hint}")
+
+
+def _require_direction(engine, axis, start):
+    """Refuse a pair that the model fits far better the other way round."""
+    p = engine.problem
+    reference, used = p.record.reference[:, p.axis], p.used
+    if not np.isfinite(p.measured).all():
+        return
+    swapped = AxisSimulator(p.measured, p.rate, p.record.temperature_c)
+    backward = _shared(reference, swapped.simulate(p.baseline.axis(p.axis)), used)
+    if backward > _ALIKE and 1 - backward < _EXCHANGED * (1 - _shared(p.measured, start, used)):
+        raise FracAccelError(
+            f"axis {axis}: reference and sensor are exchanged: the reference follows the model's "
+            f"answer to the sensor ({backward:.1%} of its power), and not the other way round; "
+            "exchange the topics of --reference and --sensor")
+
+
+def _shared(one, other, used):
+    """Square of the correlation of two signals where they count."""
+    one, other = one[used] - one[used].mean(), other[used] - other[used].mean()
+    return float((one @ other)**2 / max((one @ one) * (other @ other), 1e-300))
