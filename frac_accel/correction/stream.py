@@ -345,18 +345,19 @@ class Stream:
 
     def _advance(self, run):
         """Run the filters over samples that follow the ones before."""
-        self._waiting_index = np.r_[self._waiting_index, run.index]
-        self._waiting_stamps = np.r_[self._waiting_stamps, run.stamps_ns]
+        self._waiting_index = np.concatenate([self._waiting_index, run.index])
+        self._waiting_stamps = np.concatenate([self._waiting_stamps, run.stamps_ns])
         stated = ~np.isnan(run.variance)
-        # a bridged sample is as warm as the one after it
-        following = np.where(run.index < 0, len(run.index) - 1, np.arange(len(run.index)))
-        following = np.minimum.accumulate(following[::-1])[::-1]
-        values, variance = self._before(
-            run.values, np.where(stated, run.variance, self._noise_variance),
-            run.index[following], run.stamps_ns)
         noise_known = (stated | (self._noise_variance > 0)).all(axis=1)
-        # a bridged sample's variance says nothing of the noise: the sample after it does
-        noise_known = noise_known[following]
+        index = run.index
+        if (index < 0).any():
+            # a bridged sample is as warm as the one after it, and its variance says nothing of
+            # the noise: that of the sample after it does
+            following = np.where(index < 0, len(index) - 1, np.arange(len(index)))
+            following = np.minimum.accumulate(following[::-1])[::-1]
+            index, noise_known = index[following], noise_known[following]
+        values, variance = self._before(
+            run.values, np.where(stated, run.variance, self._noise_variance), index, run.stamps_ns)
         if self._states is None:
             if self._kept is not None:
                 values = np.concatenate([self._kept[0], values])
@@ -377,14 +378,15 @@ class Stream:
         # axes with the same filter run through it together
         for design, terms in dict.fromkeys(filters):
             rows = [axis for axis in range(3) if filters[axis] == (design, terms)]
+            rows = slice(None) if len(rows) == 3 else rows
             columns = values[:, rows].T
             # behind a high-pass every steady motion leaves the output at rest
-            level = np.zeros(len(rows)) if design.band_hz[0] else columns.mean(axis=1)
+            level = np.zeros(len(columns)) if design.band_hz[0] else columns.mean(axis=1)
             state = FilterState(design.filter, level)
             state.process(columns)
             head = np.r_[np.zeros(design.filter.lead), np.square(design.filter.impulse_head)]
             noise = FilterState(ParallelFilter(head, np.empty(0), np.empty(0)),
-                                np.zeros(len(rows)))
+                                np.zeros(len(columns)))
             noise.process(variance[:, rows].T)
             later = max(design.noise_gain**2 - head.sum(), 0.0)
             power = np.mean((columns - level[:, None])**2, axis=1)
@@ -393,7 +395,7 @@ class Stream:
                 static = StaticTermsState(terms, columns.mean(axis=1) * (not terms.is_coupled))
                 static.process(columns, variance[:, rows].T)
             self._states.append((rows, design.filter, state, noise, later, power, static))
-        self._since_start = len(values)
+        self._since_start = self._started = len(values)
         # the oldest of the waiting will have been passed over before the first output
         skipped = len(values) - self.design.delay_samples
         fresh = self._waiting_index[:skipped]
@@ -404,11 +406,11 @@ class Stream:
     def _give(self, values, variance, noise_known):
         count = len(values)
         result, spread = np.empty((count, 3)), np.empty((count, 3))
-        since = self._since_start + np.arange(1, count + 1)
         for rows, parallel_filter, state, noise, later, power, static in self._states:
             result[:, rows] = state.process(values[:, rows].T).T
             known = variance[:, rows].T
-            history = parallel_filter.unknown_history(since)**2
+            history = parallel_filter.unknown_history_after(
+                self._started + 1, self._since_start + 1, count)**2
             spread[:, rows] = (noise.process(known) + later * known + np.outer(power, history)).T
             if static:
                 added, doubt = static.process(values[:, rows].T, known)
@@ -420,17 +422,20 @@ class Stream:
         self._waiting_index = self._waiting_index[count:]
         self._waiting_stamps = self._waiting_stamps[count:]
         given = index > self._last_given
-        if given.any():
-            self._last_given = int(index[given][-1])
-        self._totals["given"] += int(given.sum())
-        index, stamps = index[given], stamps[given]
-        return Filtered(index, self._stamps(stamps),
-                        self._after(result[given], index, stamps), spread[given])
+        if not given.all():
+            index, stamps = index[given], stamps[given]
+            result, spread = result[given], spread[given]
+        if len(index):
+            self._last_given = int(index[-1])
+        self._totals["given"] += len(index)
+        return Filtered(index, self._stamps(stamps), self._after(result, index, stamps), spread)
 
 
 def _concatenated(parts):
     if not parts:
         return Filtered(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3)),
                         np.empty((0, 3)))
+    if len(parts) == 1:
+        return parts[0]
     return Filtered(*(np.concatenate([getattr(part, field.name) for part in parts])
                       for field in dataclasses.fields(Filtered)))

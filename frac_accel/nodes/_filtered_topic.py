@@ -9,10 +9,11 @@ from sensor_msgs.msg import Temperature
 from frac_accel.errors import FracAccelError
 from frac_accel.nodes._runtime import INVALID_ENDPOINT, NodeError, RawSubscription
 
-# Filtering one sample costs as much as filtering fifty, so messages are taken in small groups:
-# for at most this share of the filter's own delay, and never longer than this.
+# Filtering one sample costs as much as filtering fifty, so above this rate messages are taken in
+# small groups: for at most this share of the filter's own delay, and never longer than this.
+_GROUPED_ABOVE_HZ = 1500.0
 _GROUPING_SHARE = 0.25
-_LONGEST_GROUPING_S = 0.005
+_LONGEST_GROUPING_S = 0.0025
 _POLL_S = 0.001
 
 
@@ -95,7 +96,7 @@ class FilteredTopic:
         except INVALID_ENDPOINT as error:
             raise NodeError(f"topic {topics[1]} cannot be published: {error}") from None
         self._subscription = RawSubscription(
-            node, message_class, topics[0], self._on_messages, raw_qos(depth))
+            node, message_class, topics[0], self._on_messages, raw_qos(depth), is_direct=True)
 
     @property
     def name(self):
@@ -210,6 +211,8 @@ class FilteredTopic:
         design = self.stream.design if self._settled else None
         if design is None:
             return _LONGEST_GROUPING_S
+        if design.sampling_rate_hz < _GROUPED_ABOVE_HZ:
+            return 0.0
         delay_s = design.delay_samples / design.sampling_rate_hz
         return min(_GROUPING_SHARE * delay_s, _LONGEST_GROUPING_S)
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 from std_msgs.msg import Float64
@@ -23,6 +22,7 @@ from frac_accel.nodes._filtered_topic import FilteredTopic, raw_qos, subscribe_t
 from frac_accel.nodes._runtime import (
     FracAccelNode,
     NodeError,
+    OutsideExecutor,
     RawSubscription,
     import_message_class,
     normalised,
@@ -69,7 +69,7 @@ class Corrector(FracAccelNode):
         self._reference_s = None
         self._reference_subscription = RawSubscription(
             self, sample_class, "imu/reference", self._on_reference, raw_qos(depth),
-            callback_group=_TakenByTimer())
+            callback_group=OutsideExecutor())
         self._temperature_subscription = subscribe_temperature(
             self, [channel.topic for channel in self._channels])
         self._figures = {}
@@ -310,19 +310,6 @@ class _Channel:
             name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
             result.append(health.Publisher(name, refusal))
         return tuple(result)
-
-
-class _TakenByTimer(CallbackGroup):
-    """Keeps a subscription out of the executor, which would wake for each of its messages."""
-
-    def can_execute(self, entity):
-        return False
-
-    def beginning_execution(self, entity):
-        return False
-
-    def ending_execution(self, entity):
-        pass
 
 
 def _load(model_file):

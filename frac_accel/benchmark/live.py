@@ -1,0 +1,198 @@
+"""Messages through a node over DDS: lost, latency and processor time, beside relays.
+
+Publisher, node and sink are three processes. Latency is from the sending of the message that lets
+an output be made (for a filter with a delay of d samples, d after the one that it belongs to) to
+its arrival in the sink: what the node adds, since the filter's own delay is stated by its design.
+"""
+
+import contextlib
+import dataclasses
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from ..correction import Corrector
+from ..model import SensorModel
+from . import machine
+
+_ROOT = Path(__file__).resolve().parents[2]
+_WARM_UP_S = 1.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Passage:
+    """What came of messages sent through a node.
+
+    Attributes
+    ----------
+    sent, lost : int
+        Samples; those of the filter's warm-up and delay count as neither.
+    cpu_us : float
+        Processor time of the node per message handled [µs].
+    p50_ms, p99_ms, max_ms : float
+        Latency [ms].
+    busy_elsewhere : float
+        Processor time of everything else on the machine, in cores.
+    latencies_ms : ndarray, shape (sent - lost,)
+    start_s : float
+        From the start of the node's process to its first output, if it was started to messages
+        that were already coming; else NaN.
+    """
+
+    sent: int
+    lost: int
+    cpu_us: float
+    p50_ms: float
+    p99_ms: float
+    max_ms: float
+    busy_elsewhere: float
+    latencies_ms: np.ndarray
+    memory_mb: tuple = ()
+
+
+def model_document(rate_hz):
+    """A sensor whose inverse has a long fractional memory, with uncertain parameters."""
+    core = {"natural_frequency_hz": 0.15 * rate_hz, "damping_ratio": 0.2, "damping_order": 0.6,
+            "sensitivity": 1.0}
+    std = {"natural_frequency_hz": 0.01, "damping_ratio": 0.05, "damping_order": 0.02,
+           "sensitivity": 0.002}
+    return {"schema": "frac_accel/sensor_model/1", "core": core,
+            "covariance": {"parameters": list(core),
+                           "matrix": np.diag([(std[name] * value)**2
+                                              for name, value in core.items()]).tolist()}}
+
+
+def corrector_command(model_file, rate_hz):
+    """Command line of the corrector."""
+    return [sys.executable, "-m", "frac_accel.nodes.corrector", "--ros-args",
+            "-p", f"model_file:={model_file}", "-p", f"sample_rate_hz:={float(rate_hz)}",
+            "-p", "depth:=20000",
+            "-p", "qos_overrides./imu/data_raw.subscription.reliability:=reliable",
+            "-p", "qos_overrides./accel/blocks_raw.subscription.reliability:=reliable"]
+
+
+def relay_command(name):
+    """Command line of a relay."""
+    return [sys.executable, "-m", "frac_accel.benchmark._relays", name]
+
+
+def pass_through(command, rate_hz, duration_s, design=None, kind="imu", block=1, watch=None):
+    """`Passage` of samples at a rate through the node of a command.
+
+    Parameters
+    ----------
+    command : list of str
+    rate_hz : float
+        Samples per second.
+    duration_s : float
+    design : FilterDesign, optional
+        Of the filter in the node; none for a relay.
+    kind : str
+        ``imu`` or ``blocks``.
+    block : int
+        Samples in each message.
+    watch : callable, optional
+        Called about every second with the resident memory [MB] of the node.
+    """
+    count = int(round((duration_s + _WARM_UP_S) * rate_hz / block)) * block
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+        environment = _environment()
+        node = stack.enter_context(_process(command, environment, subprocess.DEVNULL))
+        sent_file, seen_file = (str(Path(folder) / name) for name in ("sent.npy", "seen.npy"))
+        options = ["--kind", kind, "--rate", str(rate_hz), "--count", str(count), "--block",
+                   str(block)]
+        sink, source = (
+            stack.enter_context(_process(
+                [sys.executable, "-m", "frac_accel.benchmark._traffic", role, file, *options],
+                environment, subprocess.PIPE))
+            for role, file in (("receive", seen_file), ("publish", sent_file)))
+        for process in (sink, source):
+            if process.stdout.readline().strip() != "ready":
+                raise RuntimeError(f"the processes of the benchmark did not find each other: "
+                                   f"{' '.join(command)}")
+        _tell(sink)
+        time.sleep(1.0)
+        _tell(source)
+        time.sleep(_WARM_UP_S)
+        cpu_s = machine.cpu_time_s(node.pid)
+        load = machine.Load([node.pid, sink.pid, source.pid])
+        while source.poll() is None:
+            time.sleep(min(1.0, duration_s / 10))
+            load.update()
+            if watch:
+                watch(machine.memory_mb(node.pid))
+        _until_quiet(node.pid)
+        cpu_s = machine.cpu_time_s(node.pid) - cpu_s
+        elsewhere = load.elsewhere
+        _tell(sink)
+        sink.wait(60)
+        sent, (stamps, arrivals) = np.load(sent_file), np.load(seen_file)
+    return _passage(sent, stamps, arrivals, rate_hz, block, design, cpu_s, elsewhere)
+
+
+def _passage(sent, stamps, arrivals, rate_hz, block, design, cpu_s, elsewhere):
+    from ._traffic import START_NS
+    delay, warm_up = (design.delay_samples, design.warm_up_samples) if design else (0, 0)
+    sensor_delay_ns = design.sensor_delay_ns if design else 0
+    count = len(sent) * block
+    index = np.round((stamps + sensor_delay_ns - START_NS) * 1e-9 * rate_hz).astype(np.int64)
+    index, first = np.unique(index, return_index=True)
+    expected = count - warm_up
+    # the first second is left out: discovery may lose of it, as ros.md tells
+    settled = int(_WARM_UP_S * rate_hz)
+    judged = (index >= settled) & (index < count - delay)
+    trigger = (index[judged] + delay) // block
+    latency_ms = 1e-6 * (arrivals[first][judged] - sent[trigger])
+    should = count - delay - max(settled, warm_up - delay)
+    lost = should - len(latency_ms)
+    handled = max(len(latency_ms) // block, 1)
+    p50, p99, most = np.percentile(latency_ms, (50, 99, 100)) if len(latency_ms) else [np.nan] * 3
+    return Passage(should, lost, 1e6 * cpu_s / handled, p50, p99, most, elsewhere, latency_ms)
+
+
+def write_model(folder, rate_hz):
+    """File with `model_document`, and the corrector's design for it."""
+    path = Path(folder) / "model.yaml"
+    path.write_text(yaml.safe_dump(model_document(rate_hz)))
+    return path, Corrector(SensorModel.load(path), rate_hz).design
+
+
+def _until_quiet(pid):
+    """Wait until a process has no more to do."""
+    while True:
+        before = machine.cpu_time_s(pid)
+        time.sleep(0.3)
+        if machine.cpu_time_s(pid) - before < 0.1:
+            return
+
+
+def _tell(process):
+    process.stdin.write("\n")
+    process.stdin.flush()
+
+
+@contextlib.contextmanager
+def _process(command, environment, pipe):
+    process = subprocess.Popen(command, env=environment, cwd=tempfile.gettempdir(), text=True,
+                               stdin=pipe, stdout=pipe)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        for stream in (process.stdin, process.stdout):
+            if stream:
+                stream.close()
+
+
+def _environment():
+    path = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
+    # a domain of its own, beyond those that anybody sets by hand and below the ephemeral ports
+    return {**os.environ, "PYTHONPATH": path, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            "ROS_DOMAIN_ID": str(80 + os.getpid() % 20)}
