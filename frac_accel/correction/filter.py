@@ -3,35 +3,10 @@
 import dataclasses
 
 import numpy as np
-from scipy.signal import lfilter
-
-try:
-    # what lfilter comes to after checks that cost five times as much as filtering one sample
-    from scipy.signal._sigtools import _linear_filter
-except ImportError:
-    _linear_filter = None
+from ..linear_filter import run_filter
 
 # Samples over which `unknown_history` is looked up once.
 _HISTORY_STEP = 8
-
-
-def run_filter(b, a, values, state):
-    """`scipy.signal.lfilter` along the last axis of two-dimensional float arrays.
-
-    Parameters
-    ----------
-    b, a : ndarray of float, shape (q,) and (p,)
-        With a[0] = 1.
-    values : ndarray of float, shape (k, n)
-    state : ndarray of float, shape (k, max(p, q) - 1)
-
-    Returns
-    -------
-    output, state : ndarray
-    """
-    if _linear_filter is None or not values.size:
-        return lfilter(b, a, values, zi=state)
-    return _linear_filter(b, a, values, -1, state)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ import dataclasses
 
 import numpy as np
 
-from .filter import run_filter
+from ..linear_filter import run_filter
 
 RATE_SAMPLES = 100
 JITTER = 0.1
