@@ -113,7 +113,7 @@ class FilterState:
         # lfilter convolves a pure FIR by another, length-dependent route: a zero keeps it away
         links = [(np.asarray(parallel_filter.taps, float), np.array([1.0, 0.0]))]
         links += parallel_filter.sections()
-        self._links = [(b, a, np.outer(level, _steady_state(b, a))) for b, a in links]
+        self._links = [(b, a, np.outer(level, steady_state(b, a))) for b, a in links]
         self._waiting = np.repeat(level[:, None], parallel_filter.lead, axis=1)
 
     def process(self, values):
@@ -130,8 +130,8 @@ class FilterState:
         return total
 
 
-def _steady_state(b, a):
-    """State of `lfilter` after a unit input for ever."""
+def steady_state(b, a):
+    """State of `run_filter` after a unit input for ever."""
     order = max(len(a), len(b)) - 1
     b, a = (np.pad(c, (0, order + 1 - len(c))) for c in (b, a))
     gain = b.sum() / a.sum()

@@ -8,6 +8,7 @@ import numpy as np
 from ..effects import Circumstances
 from ..errors import FracAccelError
 from .filter import FilterState, ParallelFilter
+from .parameter_uncertainty import ParameterUncertaintyState
 from .static_terms import StaticTermsState
 from .temperature import HeldTemperature
 from .timing import LARGEST, RATE_SAMPLES, SampleClock, estimate_rate
@@ -32,8 +33,9 @@ class Filtered:
         Instants that the values estimate.
     values : ndarray, shape (n, 3)
     variance : ndarray, shape (n, 3)
-        Their variance from the noise of the input, bridged gaps and what is not known of
-        the motion before the start; NaN where the noise is not known.
+        Their variance from the noise of the input, the uncertainty of the model's parameters,
+        bridged gaps and what is not known of the motion before the start; NaN where the noise is
+        not known.
     """
 
     index: np.ndarray
@@ -374,10 +376,12 @@ class Stream:
         """Bring the filters into the state that they have when their taps are first full."""
         self._kept = None
         self._states = []
-        filters = list(zip(self.design.axes, self.design.static_terms))
+        filters = list(zip(self.design.axes, self.design.static_terms,
+                           self.design.parameter_uncertainty))
         # axes with the same filter run through it together
-        for design, terms in dict.fromkeys(filters):
-            rows = [axis for axis in range(3) if filters[axis] == (design, terms)]
+        for design, terms, uncertainty in dict.fromkeys(filters):
+            rows = [axis for axis in range(3)
+                    if filters[axis] == (design, terms, uncertainty)]
             rows = slice(None) if len(rows) == 3 else rows
             columns = values[:, rows].T
             # behind a high-pass every steady motion leaves the output at rest
@@ -394,7 +398,11 @@ class Stream:
             if terms:
                 static = StaticTermsState(terms, columns.mean(axis=1) * (not terms.is_coupled))
                 static.process(columns, variance[:, rows].T)
-            self._states.append((rows, design.filter, state, noise, later, power, static))
+            doubt = None
+            if uncertainty:
+                doubt = ParameterUncertaintyState(uncertainty, columns.mean(axis=1))
+                doubt.process(columns)
+            self._states.append((rows, design.filter, state, noise, later, power, static, doubt))
         self._since_start = self._started = len(values)
         # the oldest of the waiting will have been passed over before the first output
         skipped = len(values) - self.design.delay_samples
@@ -406,16 +414,18 @@ class Stream:
     def _give(self, values, variance, noise_known):
         count = len(values)
         result, spread = np.empty((count, 3)), np.empty((count, 3))
-        for rows, parallel_filter, state, noise, later, power, static in self._states:
+        for rows, parallel_filter, state, noise, later, power, static, doubt in self._states:
             result[:, rows] = state.process(values[:, rows].T).T
             known = variance[:, rows].T
             history = parallel_filter.unknown_history_after(
                 self._started + 1, self._since_start + 1, count)**2
             spread[:, rows] = (noise.process(known) + later * known + np.outer(power, history)).T
             if static:
-                added, doubt = static.process(values[:, rows].T, known)
+                added, more = static.process(values[:, rows].T, known)
                 result[:, rows] += added.T
-                spread[:, rows] += doubt.T
+                spread[:, rows] += more.T
+            if doubt:
+                spread[:, rows] += doubt.process(values[:, rows].T).T
         spread[~noise_known] = np.nan
         self._since_start += count
         index, stamps = self._waiting_index[:count], self._waiting_stamps[:count]
