@@ -95,6 +95,8 @@ class ParameterUncertaintyState:
         links = [(taps, np.array([1.0, 0.0])) for taps in design.taps] + list(design.sections)
         self._links = [(b, a, np.outer(level, steady_state(b, a))) for b, a in links]
         self._waiting = np.repeat(level[:, None], design.lead, axis=1)
+        self._shares = design.mix.T[:, :, None, None].copy()
+        self._constants = design.constants[:, None, None]
 
     def process(self, values):
         """Variance that belongs to the next samples; shape (k, n) in and out."""
@@ -107,14 +109,18 @@ class ParameterUncertaintyState:
             output, state = run_filter(b, a, values, state)
             self._links[i] = (b, a, state)
             outputs.append(output)
-        total = np.full(values.shape, design.constant_variance)
-        slow = outputs[len(design.taps):]
-        for fast, shares, constant in zip(outputs, design.mix.tolist(), design.constants.tolist()):
-            for share, output in zip(shares, slow):
-                fast += share * output
-            fast += constant
-            fast *= fast
-            total += fast
+        count = len(design.taps)
+        if not count:
+            return np.full(values.shape, design.constant_variance)
+        sums = np.stack(outputs[:count])
+        for shares, output in zip(self._shares, outputs[count:]):
+            sums += shares * output
+        sums += self._constants
+        sums *= sums
+        total = sums[0]
+        for square in sums[1:]:
+            total += square
+        total += design.constant_variance
         return total
 
 

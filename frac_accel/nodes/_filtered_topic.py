@@ -7,13 +7,18 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Temperature
 
 from frac_accel.errors import FracAccelError
-from frac_accel.nodes._runtime import INVALID_ENDPOINT, NodeError, RawSubscription
+from frac_accel.nodes._runtime import (
+    INVALID_ENDPOINT,
+    NodeError,
+    RawSubscription,
+    publish_serialized,
+)
 
 # Filtering one sample costs as much as filtering fifty, so above this rate messages are taken in
 # small groups: for at most this share of the filter's own delay, and never longer than this.
 _GROUPED_ABOVE_HZ = 1500.0
 _GROUPING_SHARE = 0.25
-_LONGEST_GROUPING_S = 0.0025
+_LONGEST_GROUPING_S = 0.004
 _POLL_S = 0.001
 
 
@@ -258,8 +263,7 @@ class FilteredTopic:
         self._advance()
 
     def _publish(self, processed):
-        for message in processed.messages:
-            self._publisher.publish(message)
+        publish_serialized(self._publisher, processed.messages)
         self.published += len(processed.messages)
         if self._on_processed:
             self._on_processed(processed, time.time_ns())

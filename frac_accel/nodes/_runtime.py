@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import re
 import signal
@@ -317,6 +318,19 @@ class RawSubscription:
             f"{self.subscription.topic_name}: a publisher offers an incompatible {policy}; "
             "nothing is received from it"
         )
+
+
+def publish_serialized(publisher, messages: Sequence[bytes]) -> None:
+    """Publish serialised messages.
+
+    Through ``publisher.handle``, which rclpy does not document, at a third of the cost that
+    ``publish`` adds to each; where that fails, through ``publish``.
+    """
+    handle = getattr(publisher, "handle", None)
+    publish = getattr(handle, "publish_raw", None)
+    with handle if publish else contextlib.nullcontext():
+        for message in messages:
+            (publish or publisher.publish)(message)
 
 
 class OutsideExecutor(CallbackGroup):
