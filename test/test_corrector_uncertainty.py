@@ -85,7 +85,8 @@ def test_stated_standard_uncertainties_are_enough():
         "schema": "frac_accel/sensor_model/1", "core": core, "uncertainties": {
             "sensitivity": {"std": 0.02, "unit": "1"}, "damping_ratio": {"std": 0.01}}})
     values = motion(np.random.default_rng(3), 1000, 300.0)
-    one, other = (Corrector(model, RATE_HZ, noise_std=0.1).process(np.arange(1000) * 500_000, values)
+    stamps = np.arange(1000) * 500_000
+    one, other = (Corrector(model, RATE_HZ, noise_std=0.1).process(stamps, values)
                   for model in (whole, listed))
     np.testing.assert_allclose(one.variance, other.variance, rtol=1e-9)
 

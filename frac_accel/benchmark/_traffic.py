@@ -1,4 +1,4 @@
-"""Publisher and sink of the live benchmark, each a process: python -m frac_accel.benchmark._traffic.
+"""Publisher and sink of the live benchmark, each a process of its own.
 
 Both print ``ready`` once the other side has found them, do their work after a line on stdin, and
 write what they saw to a file.
@@ -48,7 +48,8 @@ def publish(node, arguments):
     publisher = node.create_publisher(message_class, topic, QOS)
     messages = encoded(arguments.kind, arguments.count, arguments.rate, arguments.block)
     rate_hz = arguments.rate / arguments.block
-    _wait(lambda: publisher.get_subscription_count())
+    if not arguments.alone:
+        _wait(lambda: publisher.get_subscription_count())
     _ready()
     sent = np.zeros(len(messages), np.int64)
     start = time.monotonic()
@@ -63,7 +64,7 @@ def publish(node, arguments):
 
 
 def receive(node, arguments):
-    """Take everything until a second line comes; stamps and instants [ns] of arrival to the file."""
+    """Take all until a second line comes; stamps and instants [ns] of arrival go to the file."""
     _, topic, message_class = TOPICS[arguments.kind]
     batches = []
     RawSubscription(node, message_class, topic, batches.append, QOS)
@@ -79,20 +80,21 @@ def receive(node, arguments):
 
     thread = threading.Thread(target=spin)
     thread.start()
-    _wait(lambda: node.count_publishers(topic))
+    if not arguments.alone:
+        _wait(lambda: node.count_publishers(topic))
     _ready()
     sys.stdin.readline()
     stop.set()
     thread.join()
     messages = [message for batch in batches for message in batch]
-    stamps = [np.empty(0, np.int64)]
-    for message in messages:
-        samples = cdr.read_samples(cdr.POINT_CLOUD2 if arguments.kind == "blocks" else cdr.IMU,
-                                   [message.data])
-        stamps.append(samples.stamps_ns)
-    arrivals = np.repeat(np.array([m.received_time_ns for m in messages], np.int64),
-                         [len(part) for part in stamps[1:]])
-    np.save(arguments.file, np.stack([np.concatenate(stamps), arrivals]))
+    arrivals = np.array([message.received_time_ns for message in messages], np.int64)
+    if arguments.kind == "imu":
+        stamps = cdr.read_samples(cdr.IMU, [message.data for message in messages]).stamps_ns
+    else:
+        parts = [cdr.read_point_cloud(message.data).stamps_ns for message in messages]
+        stamps = np.concatenate([np.empty(0, np.int64), *parts])
+        arrivals = np.repeat(arrivals, [len(part) for part in parts])
+    np.save(arguments.file, np.stack([stamps, arrivals]))
 
 
 def _ready():
@@ -117,6 +119,7 @@ def main():
     parser.add_argument("--rate", type=float, default=1000.0)
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--block", type=int, default=1)
+    parser.add_argument("--alone", action="store_true", help="do not wait for the node")
     arguments = parser.parse_args()
     rclpy.init()
     node = Node(f"benchmark_{arguments.role}")

@@ -18,8 +18,10 @@ import numpy as np
 import yaml
 
 from ..correction import Corrector
+from ..errors import FracAccelError
 from ..model import SensorModel
 from . import machine
+from .figures import Figure
 
 _ROOT = Path(__file__).resolve().parents[2]
 _WARM_UP_S = 1.0
@@ -40,9 +42,6 @@ class Passage:
     busy_elsewhere : float
         Processor time of everything else on the machine, in cores.
     latencies_ms : ndarray, shape (sent - lost,)
-    start_s : float
-        From the start of the node's process to its first output, if it was started to messages
-        that were already coming; else NaN.
     """
 
     sent: int
@@ -53,7 +52,6 @@ class Passage:
     max_ms: float
     busy_elsewhere: float
     latencies_ms: np.ndarray
-    memory_mb: tuple = ()
 
 
 def model_document(rate_hz):
@@ -107,15 +105,10 @@ def pass_through(command, rate_hz, duration_s, design=None, kind="imu", block=1,
         sent_file, seen_file = (str(Path(folder) / name) for name in ("sent.npy", "seen.npy"))
         options = ["--kind", kind, "--rate", str(rate_hz), "--count", str(count), "--block",
                    str(block)]
-        sink, source = (
-            stack.enter_context(_process(
-                [sys.executable, "-m", "frac_accel.benchmark._traffic", role, file, *options],
-                environment, subprocess.PIPE))
-            for role, file in (("receive", seen_file), ("publish", sent_file)))
+        sink, source = (stack.enter_context(_traffic(environment, role, file, *options))
+                        for role, file in (("receive", seen_file), ("publish", sent_file)))
         for process in (sink, source):
-            if process.stdout.readline().strip() != "ready":
-                raise RuntimeError(f"the processes of the benchmark did not find each other: "
-                                   f"{' '.join(command)}")
+            _await(process, command)
         _tell(sink)
         time.sleep(1.0)
         _tell(source)
@@ -143,8 +136,7 @@ def _passage(sent, stamps, arrivals, rate_hz, block, design, cpu_s, elsewhere):
     count = len(sent) * block
     index = np.round((stamps + sensor_delay_ns - START_NS) * 1e-9 * rate_hz).astype(np.int64)
     index, first = np.unique(index, return_index=True)
-    expected = count - warm_up
-    # the first second is left out: discovery may lose of it, as ros.md tells
+    # the first second is left out: the processes are still finding each other
     settled = int(_WARM_UP_S * rate_hz)
     judged = (index >= settled) & (index < count - delay)
     trigger = (index[judged] + delay) // block
@@ -154,6 +146,35 @@ def _passage(sent, stamps, arrivals, rate_hz, block, design, cpu_s, elsewhere):
     handled = max(len(latency_ms) // block, 1)
     p50, p99, most = np.percentile(latency_ms, (50, 99, 100)) if len(latency_ms) else [np.nan] * 3
     return Passage(should, lost, 1e6 * cpu_s / handled, p50, p99, most, elsewhere, latency_ms)
+
+
+def seconds_to_first_output(model_file, rate_hz):
+    """From the start of the corrector's process to its first output [s].
+
+    The messages are coming already, as those of a sensor are.
+    """
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+        environment = _environment()
+        seen_file = str(Path(folder) / "seen.npy")
+        options = ["--rate", str(rate_hz), "--count", str(int(8 * rate_hz)), "--alone"]
+        sink = stack.enter_context(_traffic(environment, "receive", seen_file, *options))
+        source = stack.enter_context(
+            _traffic(environment, "publish", str(Path(folder) / "sent.npy"), *options))
+        for process in (sink, source):
+            _await(process, ["publisher and sink"])
+            _tell(process)
+        time.sleep(1.0)
+        start_ns = time.time_ns()
+        stack.enter_context(_process(corrector_command(model_file, rate_hz), environment,
+                                     subprocess.DEVNULL))
+        source.wait(60)
+        time.sleep(0.5)
+        _tell(sink)
+        sink.wait(60)
+        arrivals = np.load(seen_file)[1]
+    if not len(arrivals):
+        raise FracAccelError("the corrector has given nothing out within 7 s")
+    return 1e-9 * (arrivals.min() - start_ns)
 
 
 def write_model(folder, rate_hz):
@@ -170,6 +191,17 @@ def _until_quiet(pid):
         time.sleep(0.3)
         if machine.cpu_time_s(pid) - before < 0.1:
             return
+
+
+def _traffic(environment, role, file, *options):
+    return _process([sys.executable, "-m", "frac_accel.benchmark._traffic", role, file, *options],
+                    environment, subprocess.PIPE)
+
+
+def _await(process, command):
+    if process.stdout.readline().strip() != "ready":
+        raise FracAccelError("the processes of the benchmark did not find each other: "
+                             + " ".join(command))
 
 
 def _tell(process):
@@ -196,3 +228,75 @@ def _environment():
     # a domain of its own, beyond those that anybody sets by hand and below the ephemeral ports
     return {**os.environ, "PYTHONPATH": path, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "ROS_DOMAIN_ID": str(80 + os.getpid() % 20)}
+
+
+def run(rounds):
+    """Figures of the corrector over DDS; rounds of all nodes in turn, medians of them."""
+    passages, starts = {}, []
+    cases = [(name, rate_hz) for rate_hz in (10_000.0, 1000.0)
+             for name in ("corrector", "raw", "raw_drained", "typed")]
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(rounds):
+            for name, rate_hz in cases:
+                model_file, design = write_model(folder, rate_hz)
+                if name == "corrector":
+                    one = pass_through(corrector_command(model_file, rate_hz), rate_hz, 5.0, design)
+                else:
+                    one = pass_through(relay_command(name), rate_hz, 3.0)
+                passages.setdefault((name, rate_hz), []).append(one)
+            starts.append(seconds_to_first_output(model_file, 1000.0))
+            model_file, design = write_model(folder, 300_000.0)
+            passages.setdefault("blocks", []).append(pass_through(
+                corrector_command(model_file, 300_000.0), 300_000.0, 3.0, design, "blocks", 300))
+    return _figures(passages, starts)
+
+
+def _figures(passages, starts):
+    def median(case, field):
+        return float(np.median([getattr(one, field) for one in passages[case]]))
+
+    def ratio(case, *others):
+        """Median over the rounds of the processor time over the least of the others'."""
+        least = np.min([[one.cpu_us for one in passages[other]] for other in others], axis=0)
+        return float(np.median([one.cpu_us for one in passages[case]] / least))
+
+    fast, slow = ("corrector", 10_000.0), ("corrector", 1000.0)
+    relays = [(name, 10_000.0) for name in ("raw", "raw_drained")]
+    typed = [("typed", rate_hz) for rate_hz in (1000.0, 10_000.0)]
+    busy = [one.busy_elsewhere for ones in passages.values() for one in ones]
+    figures = [Figure("live", "10 000 Imu/s: lost", sum(one.lost for one in passages[fast]), "",
+                      most=0),
+               Figure("live", "10 000 Imu/s: latency p50", median(fast, "p50_ms"), "ms"),
+               Figure("live", "10 000 Imu/s: latency p99", median(fast, "p99_ms"), "ms", most=10),
+               Figure("live", "10 000 Imu/s: processor time per message", median(fast, "cpu_us"),
+                      "us")]
+    figures += [Figure("live", f"{rate_hz:.0f} Imu/s: processor time per message of relay {name}",
+                       median((name, rate_hz), "cpu_us"), "us", peer=PEERS[name])
+                for name, rate_hz in (*relays, *typed)]
+    figures += [
+        Figure("live", "10 000 Imu/s: processor time over the cheaper raw relay's",
+               ratio(fast, *relays), "", most=1.5, peer=f"{PEERS['raw']}; {PEERS['raw_drained']}"),
+        Figure("live", "typed relay's processor time over ours at 10 000/s",
+               1 / ratio(fast, *typed), "", least=8, peer=PEERS["typed"]),
+        Figure("live", "typed relay at 10 000 Imu/s: lost or late, share",
+               float(np.median([one.lost / one.sent for one in passages[typed[1]]])), "",
+               peer=PEERS["typed"]),
+        Figure("live", "1000 Imu/s: lost", sum(one.lost for one in passages[slow]), "", most=0),
+        Figure("live", "1000 Imu/s: latency p50", median(slow, "p50_ms"), "ms", most=0.5),
+        Figure("live", "1000 Imu/s: latency p99", median(slow, "p99_ms"), "ms", most=3),
+        Figure("live", "1000 Imu/s: processor time per message", median(slow, "cpu_us"), "us"),
+        Figure("live", "PointCloud2, 300 000 samples/s in blocks of 300: lost",
+               sum(one.lost for one in passages["blocks"]), "", most=0),
+        Figure("live", "PointCloud2: latency p99", median("blocks", "p99_ms"), "ms"),
+        Figure("live", "PointCloud2: processor time per sample", median("blocks", "cpu_us") / 300,
+               "us"),
+        Figure("live", "start of the corrector to its first output", float(np.median(starts)), "s",
+               most=1.5),
+        Figure("live", "cores busy with something else, median", float(np.median(busy)), ""),
+        Figure("live", "cores busy with something else, most", max(busy), ""),
+    ]
+    return figures
+
+
+PEERS = {"typed": "typed callback, default executor", "raw": "raw callback, EventsExecutor",
+         "raw_drained": "raw callback that drains its queue, default executor"}

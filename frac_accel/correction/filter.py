@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+
 from ..linear_filter import run_filter
 
 # Samples over which `unknown_history` is looked up once.

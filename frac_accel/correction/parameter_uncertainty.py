@@ -1,15 +1,15 @@
 r"""Sensitivity filters: what the uncertainty of a model's parameters adds to corrected samples.
 
-Had the sensor the parameters :math:`\theta + \delta`, the true acceleration would be the corrected
-one filtered by :math:`H_\theta / H_{\theta+\delta} = 1 + \Delta_\delta`. The variance of the
-corrected sample is the mean of :math:`(\Delta_\delta * \hat a)^2` over the parameters' distribution,
-and any such mean of a quadratic form is a sum of squares,
+Had the sensor the parameters :math:`\theta + \delta`, the true acceleration would be the
+corrected one filtered by :math:`H_\theta / H_{\theta+\delta} = 1 + \Delta_\delta`. The variance
+of a corrected sample is the mean of :math:`(\Delta_\delta * \hat a)^2` over the distribution of
+the parameters, and the mean of such a quadratic form is a sum of squares,
 
 .. math:: u^2 = \sum_k (F_k * y + c_k)^2 ,
 
 of a few filters that run on the raw samples beside the inverse. To first order,
-:math:`\Delta_\delta = -\sum_i \delta_i \, \partial \ln H / \partial \theta_i`, and the F_k belong to
-the roots of the covariance (A. Link, C. Elster, *Meas. Sci. Technol.* 20 (2009) 055104, have the
+:math:`\Delta_\delta = -\sum_i \delta_i \, \partial \ln H / \partial \theta_i`, and the F_k belong
+to the roots of the covariance (A. Link, C. Elster, *Meas. Sci. Technol.* 20 (2009) 055104, have the
 same for the coefficients of a digital filter). Where the inverse does not depend linearly on the
 parameters, they belong to draws of these instead. The c_k are those of an uncertain offset.
 """
