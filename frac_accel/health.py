@@ -60,7 +60,7 @@ class Situation:
         Samples that the filter needs before its first output.
     counters, changes : dict of str to int
         Counters, and what they have grown by in the last period. Besides those of `Stream`:
-        ``malformed``, ``lost``, ``without_model``.
+        ``malformed``, ``lost``, ``late``, ``without_filter``.
     load : float
         Share of one core that the process uses.
     findings : Findings
@@ -176,6 +176,9 @@ def _troubles(s):
         troubles.append(f"{changes['malformed']} messages could not be read")
     if changes.get("lost"):
         troubles.append(f"{changes['lost']} messages were lost on the way: raise depth")
+    if changes.get("late"):
+        troubles.append(f"{changes['late']} messages waited too long before they were corrected: "
+                        "the machine is too busy")
     refused = [f"{p.node} {p.refusal}" for p in s.publishers if p.refusal]
     if refused:
         troubles.append(f"not received from another publisher: {'; '.join(refused)}")

@@ -68,7 +68,9 @@ def run(arguments):
         if not counters["given"]:
             raise BagError(f"{arguments.bag}: topic {arguments.sensor}: nothing could be corrected "
                            f"of {counters['samples']} samples: {fates(counters)}")
-    for warning in reader.warnings:
+    notes = [f"the variance is without the model's parameter uncertainty: {note}"
+             for note in dict.fromkeys(corrector.design.notes) if note]
+    for warning in [*reader.warnings, *notes]:
         print(f"warning: {warning}")
     summary = corrector.design.summary()
     print(f"{arguments.output}: {counters['given']} of {counters['samples']} samples corrected at "
@@ -82,7 +84,7 @@ def run(arguments):
     print(f"  filter delay {summary['filter_delay_s']:.4g} s; sensor's own delay "
           f"{summary['sensor_delay_s']:.4g} s, taken out of the stamps")
     write_json(arguments.json, {"output": str(arguments.output), "counters": counters,
-                                "filters": summary, "warnings": reader.warnings})
+                                "filters": summary, "warnings": [*reader.warnings, *notes]})
 
 
 def _temperatures(reader, topic, model):

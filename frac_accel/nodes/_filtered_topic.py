@@ -1,5 +1,6 @@
 """One topic through a filter to another: what `corrector` and `virtual_sensor` have in common."""
 
+import bisect
 import time
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
@@ -20,6 +21,10 @@ _GROUPED_ABOVE_HZ = 1500.0
 _GROUPING_SHARE = 0.25
 _LONGEST_GROUPING_S = 0.004
 _POLL_S = 0.001
+# Messages that wait for longer than this before what they bring is published count as late.
+LATE_S = 0.05
+# Most messages that are held while a filter is being made.
+_MOST_HELD = 200_000
 
 
 def subscribe_temperature(node, filtered_topics):
@@ -71,6 +76,10 @@ class FilteredTopic:
     unfiltered : int
         Messages that came while there was no filter to be had.
     published : int
+    late : int
+        Messages that waited for longer than `LATE_S`.
+    overflowed : int
+        Messages that were given up because too many were waiting for a filter.
     last_message_s : float or None
         Monotonic time of the last message.
     """
@@ -79,7 +88,7 @@ class FilteredTopic:
                  on_processed=None):
         self.messages = None
         self.failure = ""
-        self.unfiltered = self.published = 0
+        self.unfiltered = self.published = self.late = self.overflowed = self._deepest = 0
         self.last_message_s = None
         self._node = node
         self._worker = worker
@@ -128,8 +137,13 @@ class FilteredTopic:
         """Counters of the stream and of the messages, as a new dict of str to int."""
         if self._settled:
             self._stream_counters = {**self.stream.counters, "malformed": self.messages.malformed}
-        return {**self._stream_counters, "lost": self._subscription.lost,
-                "without_filter": self.unfiltered, "published": self.published}
+        return {**self._stream_counters, "lost": self._subscription.lost + self.overflowed,
+                "late": self.late, "without_filter": self.unfiltered, "published": self.published}
+
+    def take_queue_depth(self):
+        """Most messages that were waiting at once since the last call."""
+        depth, self._deepest = max(self._deepest, len(self._intake)), 0
+        return depth
 
     @property
     def _settled(self):
@@ -198,6 +212,9 @@ class FilteredTopic:
 
     def _on_messages(self, batch):
         self._intake += batch
+        if len(self._intake) > _MOST_HELD:
+            self.overflowed += len(self._intake) - _MOST_HELD
+            del self._intake[:-_MOST_HELD]
         if self._draining:
             return
         pause = self._next_s - time.monotonic()
@@ -231,6 +248,7 @@ class FilteredTopic:
             self._submit(self._make, *self._offered)
             return
         batch, self._intake = self._intake, []
+        self._deepest = max(self._deepest, len(batch))
         if self.messages is None:
             self.unfiltered += len(batch)
             return
@@ -240,6 +258,9 @@ class FilteredTopic:
             self._submit(self.messages.process, messages, arrivals_ns)
         else:
             self._publish(self.messages.process(messages, arrivals_ns))
+        # they came in one after the other
+        since_ns = time.time_ns() - int(1e9 * LATE_S)
+        self.late += bisect.bisect_left(arrivals_ns, since_ns)
 
     def _submit(self, function, *arguments):
         self._task = self._worker.submit(function, *arguments)

@@ -272,6 +272,7 @@ class _Channel:
             reference_silent_s=reference_silent_s))
         figures = {"received_per_s": changes.get("samples", 0) / period_s,
                    "corrected_per_s": changes.get("given", 0) / period_s,
+                   "queue_depth": float(topic.take_queue_depth()),
                    **self._metrics.take_latencies()}
         if design:
             figures["sample_rate_hz"] = design.sampling_rate_hz
@@ -330,6 +331,9 @@ def _in_short(design):
                    f"{min(axis['band_hz'][1] for axis in axes):.4g}",
         **{name: max(axis[name] for axis in axes)
            for name in ("worst_amplitude_error", "worst_phase_error_deg", "noise_gain")},
+        "parameter_uncertainty": "; ".join(dict.fromkeys(
+            known if isinstance(known, str) else known["method"]
+            for known in (axis["parameter_uncertainty"] for axis in axes))),
     }
 
 
