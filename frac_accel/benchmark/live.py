@@ -25,6 +25,8 @@ from .figures import Figure
 
 _ROOT = Path(__file__).resolve().parents[2]
 _WARM_UP_S = 1.0
+# Stamp of the first sample.
+START_NS = 1_700_000_000 * 10**9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +79,7 @@ def corrector_command(model_file, rate_hz):
 
 def relay_command(name):
     """Command line of a relay."""
-    return [sys.executable, "-m", "frac_accel.benchmark._relays", name]
+    return [sys.executable, "-m", "frac_accel.nodes._bench_relays", name]
 
 
 def pass_through(command, rate_hz, duration_s, design=None, kind="imu", block=1, watch=None):
@@ -130,7 +132,6 @@ def pass_through(command, rate_hz, duration_s, design=None, kind="imu", block=1,
 
 
 def _passage(sent, stamps, arrivals, rate_hz, block, design, cpu_s, elsewhere):
-    from ._traffic import START_NS
     delay, warm_up = (design.delay_samples, design.warm_up_samples) if design else (0, 0)
     sensor_delay_ns = design.sensor_delay_ns if design else 0
     count = len(sent) * block
@@ -194,7 +195,7 @@ def _until_quiet(pid):
 
 
 def _traffic(environment, role, file, *options):
-    return _process([sys.executable, "-m", "frac_accel.benchmark._traffic", role, file, *options],
+    return _process([sys.executable, "-m", "frac_accel.nodes._bench_traffic", role, file, *options],
                     environment, subprocess.PIPE)
 
 
@@ -234,7 +235,7 @@ def run(rounds):
     """Figures of the corrector over DDS; rounds of all nodes in turn, medians of them."""
     passages, starts = {}, []
     cases = [(name, rate_hz) for rate_hz in (10_000.0, 1000.0)
-             for name in ("corrector", "raw", "raw_drained", "typed")]
+             for name in ("corrector", "raw", "raw_drained", "typed", "typed_filter")]
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(rounds):
             for name, rate_hz in cases:
@@ -272,15 +273,18 @@ def _figures(passages, starts):
                       "us")]
     figures += [Figure("live", f"{rate_hz:.0f} Imu/s: processor time per message of relay {name}",
                        median((name, rate_hz), "cpu_us"), "us", peer=PEERS[name])
-                for name, rate_hz in (*relays, *typed)]
+                for name, rate_hz in (*relays, *typed, ("typed_filter", 1000.0))]
     figures += [
         Figure("live", "10 000 Imu/s: processor time over the cheaper raw relay's",
                ratio(fast, *relays), "", most=1.5, peer=f"{PEERS['raw']}; {PEERS['raw_drained']}"),
         Figure("live", "typed relay's processor time over ours at 10 000/s",
                1 / ratio(fast, *typed), "", least=8, peer=PEERS["typed"]),
-        Figure("live", "typed relay at 10 000 Imu/s: lost or late, share",
-               float(np.median([one.lost / one.sent for one in passages[typed[1]]])), "",
-               peer=PEERS["typed"]),
+        Figure("live", "filtering typed node's processor time over ours at 10 000/s",
+               1 / ratio(fast, ("typed_filter", 1000.0), ("typed_filter", 10_000.0)), "",
+               peer=PEERS["typed_filter"]),
+        *(Figure("live", f"{name} at 10 000 Imu/s: share lost",
+                 float(np.median([one.lost / one.sent for one in passages[name, 10_000.0]])), "",
+                 peer=PEERS[name]) for name in ("typed", "typed_filter")),
         Figure("live", "1000 Imu/s: lost", sum(one.lost for one in passages[slow]), "", most=0),
         Figure("live", "1000 Imu/s: latency p50", median(slow, "p50_ms"), "ms", most=0.5),
         Figure("live", "1000 Imu/s: latency p99", median(slow, "p99_ms"), "ms", most=3),
@@ -298,5 +302,7 @@ def _figures(passages, starts):
     return figures
 
 
-PEERS = {"typed": "typed callback, default executor", "raw": "raw callback, EventsExecutor",
+PEERS = {"typed": "typed callback, default executor",
+         "typed_filter": "the same with sosfilt of order 10, one sample at a time",
+         "raw": "raw callback, EventsExecutor",
          "raw_drained": "raw callback that drains its queue, default executor"}

@@ -100,7 +100,7 @@ class FilteredTopic:
         self._task = None
         self._hold = self._draining = False
         self._next_s = 0.0
-        self._stream_counters = {}
+        self._stream_counters, self._past_counters = {}, {}
         self._wake = node.create_guard_condition(self._advance)
         try:
             self._publisher = node.create_publisher(
@@ -123,6 +123,11 @@ class FilteredTopic:
         return self._subscription.subscription.qos_profile
 
     @property
+    def output(self):
+        """The publisher."""
+        return self._publisher
+
+    @property
     def stream(self):
         """The `Stream`, or None."""
         return self.messages.stream if self.messages else None
@@ -136,7 +141,9 @@ class FilteredTopic:
     def counters(self):
         """Counters of the stream and of the messages, as a new dict of str to int."""
         if self._settled:
-            self._stream_counters = {**self.stream.counters, "malformed": self.messages.malformed}
+            current = {**self.stream.counters, "malformed": self.messages.malformed}
+            self._stream_counters = {name: count + self._past_counters.get(name, 0)
+                                     for name, count in current.items()}
         return {**self._stream_counters, "lost": self._subscription.lost + self.overflowed,
                 "late": self.late, "without_filter": self.unfiltered, "published": self.published}
 
@@ -167,6 +174,15 @@ class FilteredTopic:
         self.messages = messages
         if self._celsius is not None:
             self.stream.set_temperature(self._celsius)
+
+    def begin_anew(self):
+        """Estimate the rate again, from the next messages; what waits in the filter is given up."""
+        if not self._settled:
+            return
+        past = self.counters
+        past["cut_off"] += past.pop("waiting")
+        self._past_counters, self._stream_counters = past, {**past, "waiting": 0}
+        self.messages = None
 
     def prepare(self, model, wishes):
         """Design another model's filter while this one goes on; raises FracAccelError."""

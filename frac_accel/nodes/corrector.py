@@ -31,6 +31,8 @@ from frac_accel.nodes._runtime import (
 
 _PERIOD_S = 1.0
 _REFERENCE_PERIOD_S = 0.1
+# For so long stamps advance at another rate before the filter is made for that.
+_OTHER_RATE_PERIODS = 2
 # Parameters that the filter is designed by, which may change while it runs.
 _DESIGN_PARAMETERS = ("model_file", "bandwidth_hz", "lowest_hz", "max_delay_s")
 _LEVELS = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
@@ -201,6 +203,7 @@ class Corrector(FracAccelNode):
         for channel in used:
             statuses.append(channel.report(period_s, load, silent_s))
             channel.evaluate(self._judge, None if lost else self._reference)
+            channel.follow_rate()
         array = DiagnosticArray(status=statuses)
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(array)
@@ -228,6 +231,7 @@ class _Channel:
         self._findings = Findings()
         self._counters = {}
         self._newest_stamp_ns = None
+        self._other_rate_periods = 0
         self.topic = FilteredTopic(
             node, message_class, topics, node.value("depth"), node.worker,
             lambda model, wishes: make_messages(node.make_stream(model, wishes)), is_optional,
@@ -248,6 +252,19 @@ class _Channel:
             self._publish(figures)
         self._evaluation = worker.submit(evaluate, self._metrics.snapshot(reference, self._design))
 
+    def follow_rate(self):
+        """Begin anew where the sensor has changed the rate that was estimated for it."""
+        rate_hz, design = self._findings.stamp_rate_hz, self._design
+        other = (rate_hz and design and not self._node.value("sample_rate_hz")
+                 and abs(rate_hz / design.sampling_rate_hz - 1) > health.RATE_SHARE)
+        self._other_rate_periods = self._other_rate_periods + 1 if other else 0
+        if self._other_rate_periods >= _OTHER_RATE_PERIODS:
+            self._other_rate_periods = 0
+            self._node.get_logger().warning(
+                f"{self.topic.name}: stamps advance at {rate_hz:.6g} Hz, no longer at "
+                f"{design.sampling_rate_hz:.6g} Hz: the filter is made again")
+            self.topic.begin_anew()
+
     def is_used(self):
         """Whether anybody has ever published on the raw topic."""
         return self.topic.last_message_s is not None or bool(self._publishers())
@@ -264,6 +281,7 @@ class _Channel:
         level, message = health.judge(health.Situation(
             topic=topic.name, model_file=self._node.value("model_file"), failure=topic.failure,
             designing=topic.designing, publishers=self._publishers(),
+            refused_subscribers=self._refused_subscribers(),
             seconds_since_message=silent_s,
             stated_rate_hz=self._node.value("sample_rate_hz"),
             sample_rate_hz=design.sampling_rate_hz if design else None,
@@ -310,6 +328,21 @@ class _Channel:
                            f"qos_overrides.{self.topic.name}.subscription")
             name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
             result.append(health.Publisher(name, refusal))
+        return tuple(result)
+
+    def _refused_subscribers(self):
+        """Who asks for the corrected topic with a QoS that it does not offer, and why not."""
+        node, topic = self._node, self.topic.output.topic_name
+        # as the others see it: the profile that we asked for leaves much to the middleware
+        offered = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)
+                   if (info.node_namespace, info.node_name) == (node.get_namespace(),
+                                                                node.get_name())]
+        result = []
+        for info in node.get_subscriptions_info_by_topic(topic) if offered else ():
+            compatibility, reason = qos_check_compatible(offered[0], info.qos_profile)
+            if compatibility == QoSCompatibility.ERROR:
+                name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+                result.append(f"{name} ({reason.strip().rstrip(';')})")
         return tuple(result)
 
 

@@ -17,14 +17,14 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, PointCloud2
 
 from .. import cdr
-from ..nodes._runtime import RawSubscription
+from ..benchmark.live import START_NS
 from ..samples import Samples
+from ._runtime import RawSubscription
 
 DEPTH = 20_000
 QOS = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)
 TOPICS = {"imu": ("imu/data_raw", "imu/data", Imu),
           "blocks": ("accel/blocks_raw", "accel/blocks", PointCloud2)}
-START_NS = 1_700_000_000 * 10**9
 
 
 def stamps_ns(count, rate_hz):
