@@ -95,6 +95,7 @@ def test_stated_standard_uncertainties_are_enough():
     ({"covariance": {"parameters": ["no_such"], "matrix": [[1.0]]}}, "no_such"),
     ({"covariance": {"parameters": ["damping_ratio"], "matrix": [[-1.0]]}}, "at least 0"),
     ({"uncertainties": {"damping_ratio": 0.1}}, "uncertainties"),
+    ({"uncertainties": {"damping_ratio": {"std": "much"}}}, "uncertainties.damping_ratio.std"),
 ])
 def test_what_cannot_be_used_is_said(more, words):
     model = SensorModel.from_dict({

@@ -44,7 +44,10 @@ def record(sensor):
 @pytest.fixture(scope="module")
 def model_file(sensor, tmp_path_factory):
     path = tmp_path_factory.mktemp("model") / "sensor.yaml"
-    path.write_text(yaml.safe_dump(sensor.to_model()))
+    document = sensor.to_model()
+    document["covariance"] = {"parameters": ["damping_ratio", "damping_order"],
+                              "matrix": [[1e-4, 0.0], [0.0, 1e-4]]}
+    path.write_text(yaml.safe_dump(document))
     return path
 
 
@@ -105,6 +108,8 @@ def test_every_fault_of_the_stream_is_counted_and_passes(record, model_file):
     live = cdr.read_samples(cdr.IMU, received)
     np.testing.assert_array_equal(live.stamps_ns, np.concatenate([p.stamps_ns for p in expected]))
     np.testing.assert_array_equal(live.values, np.concatenate([p.values for p in expected]))
+    np.testing.assert_array_equal(live.variance, np.concatenate([p.variance for p in expected]))
+    assert all(offline.design.parameter_uncertainty)
     counters = {name: int(number) for name, number in
                 (item.split() for item in node.output[-1].split(": ")[1].split(", "))}
     assert counters.pop("published") == count

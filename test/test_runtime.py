@@ -131,6 +131,22 @@ def test_direct_subscriptions_need_no_executor_and_fall_back_on_it(node):
     assert received() == sent
 
 
+def test_a_topic_that_never_falls_silent_leaves_time_for_the_rest(node):
+    publisher = node.create_publisher(Imu, "/imu/data_raw", 100)
+    subscription = RawSubscription(
+        node, Imu, "/imu/data_raw",
+        lambda batch: (publisher.publish(message(0)), time.sleep(0.01)), QoSProfile(depth=100),
+        is_direct=True)
+    deadline = time.monotonic() + 20
+    while not subscription.subscription.get_publisher_count() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    publisher.publish(message(0))
+    intake = _DirectIntake(node)
+    start = time.monotonic()
+    intake.wait(0.1)
+    assert time.monotonic() - start < 1.0
+
+
 def test_serialised_messages_are_published_the_documented_way_where_there_is_no_other():
     class Publisher:
         published = []

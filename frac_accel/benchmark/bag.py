@@ -14,7 +14,9 @@ from mcap.writer import Writer
 
 from .. import cdr
 from ..bag import RAW_TOPIC, BagWriter
+from ..errors import FracAccelError
 from ..samples import Samples
+from . import machine
 from .figures import Figure
 from .live import _ROOT, model_document
 
@@ -66,12 +68,16 @@ def _correct(folder):
         [sys.executable, "-m", "frac_accel.cli", "correct", "raw.mcap", "--model", "model.yaml",
          "-o", "out.mcap"], cwd=folder, env={**os.environ, "PYTHONPATH": path},
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
+    # not what wait4 says of the memory: that begins with ours, which the child was forked from
+    memory_mb = 0.0
+    while (done := os.wait4(process.pid, os.WNOHANG))[0] == 0:
+        memory_mb = max(memory_mb, machine.most_memory_mb(process.pid) or 0.0)
+        time.sleep(0.02)
+    seconds = time.perf_counter() - start
+    process.returncode = os.waitstatus_to_exitcode(done[1])
     if process.returncode:
-        raise subprocess.CalledProcessError(process.returncode, process.args)
-    return (time.perf_counter() - start, usage.ru_utime + usage.ru_stime,
-            usage.ru_maxrss * 1024e-6)
+        raise FracAccelError(f"correct has ended with status {process.returncode}")
+    return seconds, done[2].ru_utime + done[2].ru_stime, memory_mb
 
 
 def _copy(source, target, count):

@@ -18,6 +18,17 @@ def memory_mb(pid):
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
+def most_memory_mb(pid):
+    """Largest resident memory [MB] that a process has had; None once it has ended."""
+    try:
+        for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) * 1024e-6
+    except OSError:
+        pass
+    return None
+
+
 class Load:
     """How many cores were busy with anything but some processes, from the start to the last update.
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..linear_filter import run_filter
+from ..parameters import number
 from .filter import steady_state
 
 # Of the standard uncertainty at each frequency: permitted error of the filters, and what may be
@@ -32,6 +33,7 @@ _NOISE_WEIGHTS = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-5)
 # Of the poles that carry the inverse's long memory, the sensitivities need every third.
 _THINNED = 2
 _DRAWS = 400
+_MOST_FREQUENCIES = 2000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -153,13 +155,16 @@ def design_parameter_uncertainty(model, name, problem, delay, linear):
     if uncertain is None:
         return None
     offset_gain = -linear.filter.static_gain if linear.band_hz[0] == 0 else 0.0
-    frequency = problem.check
+    step = -(-len(problem.check) // _MOST_FREQUENCIES)
+    frequency, target = problem.check[::step], problem.check_target[::step]
     s = 2j * np.pi * np.maximum(frequency, 1e-9 * problem.rate)
     changes, constants, method, nonlinearity = _changes(uncertain, s, offset_gain)
     moved = np.abs(uncertain.slopes(s[:: max(1, len(s) // 50)])).max(axis=1) > 0
     left_out = tuple(parameter for parameter, is_moved in zip(uncertain.names, moved)
                      if not is_moved and parameter != "offset")
     relative = np.sqrt(np.sum(np.abs(changes)**2, axis=0))
+    if not np.isfinite(relative).all():
+        raise ModelError("covariance: it cannot be propagated, the response changes without bound")
     if not relative.any():
         return ParameterUncertainty(
             np.empty((0, 1)), (), np.empty((0, 0)), np.empty(0), float(np.sum(constants**2)), 0,
@@ -170,11 +175,11 @@ def design_parameter_uncertainty(model, name, problem, delay, linear):
     taps, poles = problem.structure(delay - wait)
     poles = _thinned(poles)
     phase = np.exp(2j * np.pi * frequency * (delay - wait + problem.extra_delay) / problem.rate)
-    scale = phase / (problem.check_target * unit)
+    scale = phase / (target * unit)
     columns = problem.columns(frequency, taps, poles) * scale[:, None]
     outside = problem.columns(problem.outside, taps, poles) \
         * (problem.outside_weight / relative.max())[:, None]
-    unknowns, error = _fitted(columns, changes / unit, outside, np.isin(frequency, problem.grid))
+    unknowns, error = _fitted(columns, changes / unit, outside)
     sections = []
     for pole in poles:
         if not pole.imag:
@@ -199,7 +204,8 @@ def _uncertain_axis(model, name):
                 isinstance(entry, dict) and "std" in entry for entry in given.values()):
             raise ModelError(f"uncertainties: {given!r:.60} given, expected the std of each "
                              "parameter")
-        std = [entry["std"] for entry in given.values()]
+        std = [number(entry["std"], f"uncertainties.{name}.std")
+               for name, entry in given.items()]
         stated = {"parameters": list(given), "matrix": [
             [std[i]**2 if i == j else 0.0 for j in range(len(std))] for i in range(len(std))]}
     if stated is None:
@@ -262,12 +268,13 @@ def _principal(changes, constants, unit):
     return changes[:count], constants[:count], float(np.sum(constants[count:]**2))
 
 
-def _fitted(columns, wanted, outside, is_fitted):
+def _fitted(columns, wanted, outside):
     """Least-squares unknowns of all filters (u, k), and their worst error.
 
-    With as little gain outside the band as the tolerance allows.
+    With as little gain outside the band as the tolerance allows. Every other frequency is left out
+    of the fit, so that the error is looked up between those fitted, too.
     """
-    inside, target = columns[is_fitted], wanted[:, is_fitted].T
+    inside, target = columns[::2], wanted[:, ::2].T
     matrix = np.concatenate([inside.real, inside.imag]) / np.sqrt(len(inside))
     basis, triangle = np.linalg.qr(matrix)
     right = basis.T @ np.concatenate([target.real, target.imag]) / np.sqrt(len(inside))

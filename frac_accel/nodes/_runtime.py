@@ -272,9 +272,16 @@ class RawSubscription:
             raise NodeError(f"topic {topic} cannot be subscribed to: {error}") from None
 
     def drain(self) -> None:
-        """Hand over what is waiting now; a node calls it before it ends."""
-        while batch := self._waiting():
+        """Hand over what is waiting, until nothing is; a node calls it before it ends."""
+        while self.take_batch():
+            pass
+
+    def take_batch(self) -> bool:
+        """Hand over what is waiting now, once; whether there was anything."""
+        batch = self._waiting()
+        if batch:
             self._callback(batch)
+        return bool(batch)
 
     def _on_message(self, data: bytes, info) -> None:
         self._callback([self._received(data, info), *self._waiting()])
@@ -372,7 +379,7 @@ class _DirectIntake:
         end_s = time.monotonic() + seconds
         while (left_s := end_s - time.monotonic()) > 0 and self.is_possible:
             for subscription in self._attempt(self._ready, left_s) or ():
-                subscription.drain()
+                subscription.take_batch()
 
     def _make(self, node: FracAccelNode) -> None:
         self._wait_set = rclpy_implementation.WaitSet(
