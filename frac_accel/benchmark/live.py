@@ -245,7 +245,8 @@ def run(rounds):
                 else:
                     one = pass_through(relay_command(name), rate_hz, 3.0)
                 passages.setdefault((name, rate_hz), []).append(one)
-            starts.append(seconds_to_first_output(model_file, 1000.0))
+            # twice, as the middleware may take another three seconds to discover the node
+            starts += [seconds_to_first_output(model_file, 1000.0) for _ in range(2)]
             model_file, design = write_model(folder, 300_000.0)
             passages.setdefault("blocks", []).append(pass_through(
                 corrector_command(model_file, 300_000.0), 300_000.0, 3.0, design, "blocks", 300))
@@ -294,8 +295,10 @@ def _figures(passages, starts):
         Figure("live", "PointCloud2: latency p99", median("blocks", "p99_ms"), "ms"),
         Figure("live", "PointCloud2: processor time per sample", median("blocks", "cpu_us") / 300,
                "us"),
-        Figure("live", "start of the corrector to its first output", float(np.median(starts)), "s",
-               most=1.5),
+        Figure("live", "start of the corrector to its first output, median",
+               float(np.median(starts)), "s", most=1.5),
+        Figure("live", "start of the corrector to its first output, discovered at once",
+               min(starts), "s", most=1.5),
         Figure("live", "cores busy with something else, median", float(np.median(busy)), ""),
         Figure("live", "cores busy with something else, most", max(busy), ""),
     ]
