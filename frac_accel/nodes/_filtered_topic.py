@@ -16,10 +16,9 @@ from frac_accel.nodes._runtime import (
 )
 
 # Filtering one sample costs as much as filtering fifty, so above this rate messages are taken in
-# small groups: for at most this share of the filter's own delay, and never longer than this.
+# groups, for so long.
 _GROUPED_ABOVE_HZ = 1500.0
-_GROUPING_SHARE = 0.25
-_LONGEST_GROUPING_S = 0.004
+_GROUPING_S = 0.004
 _POLL_S = 0.001
 # Messages that wait for longer than this before what they bring is published count as late.
 LATE_S = 0.05
@@ -247,12 +246,7 @@ class FilteredTopic:
 
     def _grouping_s(self):
         design = self.stream.design if self._settled else None
-        if design is None:
-            return _LONGEST_GROUPING_S
-        if design.sampling_rate_hz < _GROUPED_ABOVE_HZ:
-            return 0.0
-        delay_s = design.delay_samples / design.sampling_rate_hz
-        return min(_GROUPING_SHARE * delay_s, _LONGEST_GROUPING_S)
+        return 0.0 if design and design.sampling_rate_hz < _GROUPED_ABOVE_HZ else _GROUPING_S
 
     def _advance(self):
         """Filter what has been taken in, unless the filter is being made."""
