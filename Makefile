@@ -1,4 +1,4 @@
-# make setup | demo | test | lint | bench | blind | browser | pins | clean
+# make setup | demo | test | lint | bench | soak | blind | browser | pins | clean
 # Needs Python 3.10 to 3.13, git and make. PYTHON=python3.12 chooses the Python of .venv.
 
 # A ROS that is sourced, or another venv with ROS, must not leak into ours.
@@ -6,7 +6,7 @@ unexport PYTHONPATH LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DELETE_ON_ERROR:
-.PHONY: setup demo test test-oldest lint bench blind browser pins clean FORCE
+.PHONY: setup demo test test-oldest lint bench soak blind browser pins clean FORCE
 
 venv := .venv
 oldest := .venv-oldest
@@ -43,8 +43,14 @@ test-oldest: $(oldest)/.done
 lint: $(venv)/.done
 	$(python) -m ruff check .
 
+# On a quiet machine; what else it was busy with stands in the output.
 bench: setup
-	for script in benchmarks/*.py; do $(python) $$script || exit; done
+	$(python) -m frac_accel.cli bench --json bench.json
+	$(python) benchmarks
+
+# MINUTES=2 for a shorter one.
+soak: setup
+	$(python) -m frac_accel.benchmark.soak --minutes $(or $(MINUTES),10) --picture soak.png
 
 # Hours; goes on where it was stopped. BLIND="single --seed-set 1 --first 2" for a part of it.
 blind: export OPENBLAS_NUM_THREADS := 1

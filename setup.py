@@ -45,6 +45,7 @@ setup(
         "plotly>=5.13",
         "numba>=0.57",  # simulation of nonlinear springs and friction
     ],
+    extras_require={"bench": ["PyDynamic>=2.4"]},  # what `frac_accel bench` compares with
     entry_points={
         "console_scripts": [
             "frac_accel = frac_accel.cli:main",

@@ -9,8 +9,7 @@ import sys
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 FOLDER = pathlib.Path(__file__).parent
-NAMES = ("pydynamic_shock", "simulation_speed", "nonlinear_speed", "correction_speed",
-         "identify_peers")
+NAMES = ("pydynamic_shock", "simulation_speed", "nonlinear_speed", "identify_peers")
 
 
 def print_table(rows):

@@ -29,19 +29,24 @@ def shock(time_s):
     return PEAK * np.exp(-0.5 * ((time_s - SHOCK_AT_S) / SIGMA_S)**2)
 
 
-def sensor_output():
+def sensor_output(core=None):
     """The sensor's response at its sampling instants, without noise, shape (SAMPLES,).
+
+    `core` may give it other parameters, by the names of the model file.
 
     The shock is a Gaussian, so its spectrum is known in closed form; the response is that spectrum
     times the sensor's, transformed back over a period of 64 times the ringing's time constant.
     """
-    natural = 2 * np.pi * NATURAL_HZ
-    period_s = 64 / (DAMPING * natural)
+    core = core or {"natural_frequency_hz": NATURAL_HZ, "damping_ratio": DAMPING,
+                    "sensitivity": STATIC_GAIN}
+    natural, damping = 2 * np.pi * core["natural_frequency_hz"], core["damping_ratio"]
+    period_s = 64 / (damping * natural)
     points = int(np.ceil(period_s * RATE_HZ))
     omega = 2 * np.pi * np.fft.rfftfreq(points, 1 / RATE_HZ)
     spectrum = (PEAK * SIGMA_S * np.sqrt(2 * np.pi) * np.exp(-0.5 * (omega * SIGMA_S)**2)
                 * np.exp(-1j * omega * SHOCK_AT_S))
-    response = STATIC_GAIN * natural**2 / (natural**2 - omega**2 + 2j * DAMPING * natural * omega)
+    response = core["sensitivity"] * natural**2 / (
+        natural**2 - omega**2 + 2j * damping * natural * omega)
     return np.fft.irfft(spectrum * response, points)[:SAMPLES] * RATE_HZ
 
 

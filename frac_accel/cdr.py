@@ -19,6 +19,7 @@ taken message by message with the same result.  No function here needs ROS.
 
 from __future__ import annotations
 
+import functools
 import struct
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -221,29 +222,7 @@ def patch_samples(
     stamps_ns : int (n,)
     values, variance : float (n, 3)
     """
-    if not messages:
-        return []
-    stamps_ns = np.asarray(stamps_ns, dtype=np.int64)
-    values = np.asarray(values, dtype=np.float64)
-    buffer, offsets, lengths = _joined(messages)
-    buffer = bytearray(buffer)
-    records, _ = _records(type_name, buffer, offsets, lengths)
-    if records is None:
-        variances = [None] * len(messages) if variance is None else np.asarray(variance)
-        return [
-            patch_sample(type_name, message, stamp_ns, value, of_message)
-            for message, stamp_ns, value, of_message in zip(
-                messages, stamps_ns.tolist(), values, variances
-            )
-        ]
-    records["sec"], records["nanosec"] = split_stamps(stamps_ns)
-    records["acceleration"] = values
-    if variance is not None and "covariance" in records.dtype.names:
-        diagonal = records["covariance"][:, _DIAGONAL]
-        records["covariance"][:, _DIAGONAL] = np.where(np.isnan(variance), diagonal, variance)
-    size = int(lengths[0])
-    patched = bytes(buffer)
-    return [patched[start : start + size] for start in range(0, len(patched), size)]
+    return _patched(type_name, messages, stamps_ns, values, variance, is_whole=False)
 
 
 def replace_samples(
@@ -254,13 +233,41 @@ def replace_samples(
     It becomes diagonal, or all zeros (unknown) where the variance of an axis is NaN.
     """
     known = ~np.isnan(variance).any(axis=1, keepdims=True)
-    return patch_samples(
-        type_name,
-        [_without_covariance(type_name, message) for message in messages],
-        stamps_ns,
-        values,
-        np.where(known, variance, 0.0),
+    return _patched(
+        type_name, messages, stamps_ns, values, np.where(known, variance, 0.0), is_whole=True
     )
+
+
+def _patched(type_name, messages, stamps_ns, values, variance, is_whole) -> list[bytes]:
+    if not messages:
+        return []
+    stamps_ns = np.asarray(stamps_ns, dtype=np.int64)
+    values = np.asarray(values, dtype=np.float64)
+    buffer, offsets, lengths = _joined(messages)
+    buffer = bytearray(buffer)
+    records, _ = _records(type_name, buffer, offsets, lengths)
+    if records is None:
+        variances = [None] * len(messages) if variance is None else np.asarray(variance)
+        if is_whole:
+            messages = [_without_covariance(type_name, message) for message in messages]
+        return [
+            patch_sample(type_name, message, stamp_ns, value, of_message)
+            for message, stamp_ns, value, of_message in zip(
+                messages, stamps_ns.tolist(), values, variances
+            )
+        ]
+    records["sec"], records["nanosec"] = split_stamps(stamps_ns)
+    records["acceleration"] = values
+    if variance is not None and "covariance" in records.dtype.names:
+        covariance = records["covariance"]
+        if is_whole:
+            covariance[:] = 0.0
+        else:
+            variance = np.where(np.isnan(variance), covariance[:, _DIAGONAL], variance)
+        covariance[:, _DIAGONAL] = variance
+    size = int(lengths[0])
+    patched = bytes(buffer)
+    return [patched[start : start + size] for start in range(0, len(patched), size)]
 
 
 def _without_covariance(type_name: str, message: bytes) -> bytes:
@@ -420,22 +427,11 @@ def _records(
     """
     start, size = int(offsets[0]), int(lengths[0])
     first = bytes(buffer[start : start + size])
-    header, fields = _checked_layout(type_name, first)
+    header, _ = _checked_layout(type_name, first)
     if (lengths != size).any():
         return None, header.frame_id
-    order, body = header.byte_order, header.body_offset
-    # The encapsulation's options (bytes 2, 3) may differ: they do not move anything.
-    names = ["encapsulation", "sec", "nanosec", "frame", *fields]
-    frame_size = struct.unpack_from(order + "I", first, 12)[0]
-    layout = np.dtype(
-        {
-            "names": names,
-            "formats": ["u1", order + "i4", order + "u4", ("u1", (4 + frame_size,))]
-            + [(order + "f8", (field.count,)) for field in fields.values()],
-            "offsets": [1, 4, 8, 12] + [body + field.offset for field in fields.values()],
-            "itemsize": size,
-        }
-    )
+    frame_size = struct.unpack_from(header.byte_order + "I", first, 12)[0]
+    layout = _layout(type_name, header.byte_order, frame_size, header.body_offset, size)
     step = int(offsets[1]) - start if len(offsets) > 1 else size
     if step > 0 and (np.diff(offsets) == step).all():
         records = np.ndarray(len(offsets), layout, buffer, start, (step,))
@@ -446,6 +442,22 @@ def _records(
         records["frame"] == np.frombuffer(first, np.uint8, 4 + frame_size, 12)
     ).all()
     return (records if same else None), header.frame_id
+
+
+@functools.lru_cache
+def _layout(type_name: str, order: str, frame_size: int, body: int, size: int) -> np.dtype:
+    """Structure of a message of this size."""
+    fields = _FIELDS[type_name]
+    # The encapsulation's options (bytes 2, 3) may differ: they do not move anything.
+    return np.dtype(
+        {
+            "names": ["encapsulation", "sec", "nanosec", "frame", *fields],
+            "formats": ["u1", order + "i4", order + "u4", ("u1", (4 + frame_size,))]
+            + [(order + "f8", (field.count,)) for field in fields.values()],
+            "offsets": [1, 4, 8, 12] + [body + field.offset for field in fields.values()],
+            "itemsize": size,
+        }
+    )
 
 
 def _stamps(records: np.ndarray) -> np.ndarray:

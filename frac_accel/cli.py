@@ -17,6 +17,7 @@ VERBS = {
     "correct": "raw acceleration -> corrected acceleration",
     "diagnose": "what a simulation gets wrong, the cause, the extension, the gain",
     "paper": "the seed paper's tables and figures again, and the audit of its claims",
+    "bench": "speed, latency and memory, beside peers in the same run",
 }
 
 

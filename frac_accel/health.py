@@ -10,7 +10,7 @@ OK, WARN, ERROR = range(3)
 # A topic is silent after this long without a message [s].
 SILENT_AFTER_S = 2.0
 # The stamps' rate may be off the stated one by this share.
-_RATE_SHARE = 0.05
+RATE_SHARE = 0.05
 _BUSY = 0.9
 _DROPPED = {
     "duplicates": "had the same stamp as the one before",
@@ -50,6 +50,8 @@ class Situation:
     designing : bool
         Whether a filter is being designed and nothing can be corrected before it is there.
     publishers : tuple of Publisher
+    refused_subscribers : tuple of str
+        Who asks for the corrected topic in vain, and why.
     seconds_since_message : float or None
         None if there never was one.
     stated_rate_hz : float
@@ -60,7 +62,7 @@ class Situation:
         Samples that the filter needs before its first output.
     counters, changes : dict of str to int
         Counters, and what they have grown by in the last period. Besides those of `Stream`:
-        ``malformed``, ``lost``, ``without_model``.
+        ``malformed``, ``lost``, ``late``, ``without_filter``.
     load : float
         Share of one core that the process uses.
     findings : Findings
@@ -73,6 +75,7 @@ class Situation:
     failure: str = ""
     designing: bool = False
     publishers: tuple = ()
+    refused_subscribers: tuple = ()
     seconds_since_message: float | None = None
     stated_rate_hz: float = 0.0
     sample_rate_hz: float | None = None
@@ -176,9 +179,15 @@ def _troubles(s):
         troubles.append(f"{changes['malformed']} messages could not be read")
     if changes.get("lost"):
         troubles.append(f"{changes['lost']} messages were lost on the way: raise depth")
+    if changes.get("late"):
+        troubles.append(f"{changes['late']} messages waited too long before they were corrected: "
+                        "the machine is too busy")
     refused = [f"{p.node} {p.refusal}" for p in s.publishers if p.refusal]
     if refused:
         troubles.append(f"not received from another publisher: {'; '.join(refused)}")
+    if s.refused_subscribers:
+        troubles.append("not delivered to a subscriber that asks for another quality of service: "
+                        + ", ".join(s.refused_subscribers))
     if _other_rate(s):
         troubles.append(f"sample_rate_hz is {s.stated_rate_hz:.6g}{_other_rate(s)}")
     if changes.get("without_temperature"):
@@ -203,6 +212,6 @@ def _troubles(s):
 def _other_rate(s):
     """What the stamps say of a stated rate that they do not have."""
     actual = s.findings.stamp_rate_hz
-    if not s.stated_rate_hz or not actual or abs(actual / s.stated_rate_hz - 1) < _RATE_SHARE:
+    if not s.stated_rate_hz or not actual or abs(actual / s.stated_rate_hz - 1) < RATE_SHARE:
         return ""
     return f", but the stamps advance at {actual:.6g} Hz"

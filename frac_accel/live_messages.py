@@ -127,37 +127,51 @@ class BlockMessages:
         self.stream = stream
         self.malformed = 0
         self._plain = plain
-        self._starts, self._arrivals_ns = [], []
-        self._frame_id = ""
+        self._starts, self._arrivals_ns, self._frames = [], [], []
 
     def process(self, messages, arrivals_ns):
         """`Processed` of the next messages; raises as `Stream.process`."""
-        parts = []
+        blocks, first = [], len(self._starts)
+        count = self.stream.counters["samples"]
         for message, arrival_ns in zip(messages, arrivals_ns):
             _, _, samples = _read(cdr.POINT_CLOUD2, [message], [arrival_ns], self._plain,
                                   self._count_malformed)
             if len(samples.stamps_ns):
-                self._frame_id = samples.frame_id
-                self._starts.append(self.stream.counters["samples"])
+                blocks.append(samples)
+                self._starts.append(count)
                 self._arrivals_ns.append(arrival_ns)
-                parts.append(self._taken(samples, self.stream.process(*samples[:3])))
-        return _joined(parts)
+                self._frames.append(samples.frame_id)
+                count += len(samples.stamps_ns)
+        if not blocks:
+            return _nothing_processed()
+        # together, as one block costs as much to filter as some hundred samples
+        samples = Samples.concatenate(blocks)
+        return self._taken(samples, self.stream.process(*samples[:3]), first)
 
     def replace(self, model, wishes):
         """`Processed` with what `Stream.replace` gives out."""
-        return self._taken(_nothing(), self.stream.replace(model, **wishes))
+        return self._taken(_nothing(), self.stream.replace(model, **wishes),
+                           max(len(self._starts) - 1, 0))
 
-    def _taken(self, samples, filtered):
+    def _taken(self, samples, filtered, first):
+        """`Processed`; those that a block has made ready, from the `first` on, are a message."""
         messages = []
         arrivals_ns = np.empty(0, np.int64)
         if len(filtered):
             arrivals_ns = np.array(self._arrivals_ns)[self._block_of(filtered.index)]
-            messages.append(cdr.encode_point_cloud(
-                Samples(filtered.stamps_ns, filtered.values, filtered.variance, self._frame_id)))
+            made_ready_by = np.maximum(
+                self._block_of(filtered.index + self.stream.design.delay_samples), first)
+            edges = np.flatnonzero(np.diff(made_ready_by)) + 1
+            for start, stop in zip([0, *edges], [*edges, len(filtered)]):
+                messages.append(cdr.encode_point_cloud(Samples(
+                    filtered.stamps_ns[start:stop], filtered.values[start:stop],
+                    filtered.variance[start:stop], self._frames[made_ready_by[start]])))
         if len(self._starts) > _FORGET_AT:
-            kept = np.unique(self._block_of(self.stream.waiting))
+            kept = np.unique(np.append(self._block_of(self.stream.waiting),
+                                       len(self._starts) - 1))
             self._starts = [self._starts[i] for i in kept]
             self._arrivals_ns = [self._arrivals_ns[i] for i in kept]
+            self._frames = [self._frames[i] for i in kept]
         return Processed(messages, samples, filtered.stamps_ns, filtered.values, arrivals_ns)
 
     def _block_of(self, index):
@@ -194,14 +208,6 @@ def _nothing():
     return Samples.of([], np.empty((0, 3)))
 
 
-def _joined(parts):
-    if len(parts) == 1:
-        return parts[0]
-    if not parts:
-        return Processed([], _nothing(), np.empty(0, np.int64), np.empty((0, 3)),
-                         np.empty(0, np.int64))
-    return Processed(
-        [message for part in parts for message in part.messages],
-        Samples.concatenate([part.raw for part in parts]),
-        *(np.concatenate([getattr(part, name) for part in parts])
-          for name in ("stamps_ns", "values", "arrivals_ns")))
+def _nothing_processed():
+    return Processed([], _nothing(), np.empty(0, np.int64), np.empty((0, 3)),
+                     np.empty(0, np.int64))

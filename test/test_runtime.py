@@ -18,8 +18,10 @@ from frac_accel.nodes._runtime import (  # noqa: E402
     FracAccelNode,
     NodeError,
     RawSubscription,
+    _DirectIntake,
     import_message_class,
     normalised,
+    publish_serialized,
 )
 
 pytestmark = pytest.mark.ros
@@ -97,6 +99,63 @@ def test_all_messages_come_once_and_in_order(node, can_drain):
         assert max(map(len, batches)) > 10
     else:
         assert set(map(len, batches)) == {1}
+
+
+def test_direct_subscriptions_need_no_executor_and_fall_back_on_it(node):
+    batches = []
+    publisher = node.create_publisher(Imu, "/imu/data_raw", 100)
+    subscription = RawSubscription(node, Imu, "/imu/data_raw", batches.append,
+                                   QoSProfile(depth=100), is_direct=True)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    deadline = time.monotonic() + 20
+    while not subscription.subscription.get_publisher_count() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    intake = _DirectIntake(node)
+    sent = [message(number) for number in range(20)]
+
+    def received():
+        return [one.data for batch in batches for one in batch]
+
+    publish_serialized(publisher, sent[:10])
+    executor.spin_once(timeout_sec=0.1)
+    assert not batches
+    while len(received()) < 10 and time.monotonic() < deadline:
+        intake.wait(0.1)
+    assert received() == sent[:10]
+    intake._wait_set = None  # as in an rclpy without it
+    intake.wait(0.1)
+    assert not intake.is_possible
+    publish_serialized(publisher, sent[10:])
+    spin_until(executor, lambda: len(received()) == 20)
+    assert received() == sent
+
+
+def test_a_topic_that_never_falls_silent_leaves_time_for_the_rest(node):
+    publisher = node.create_publisher(Imu, "/imu/data_raw", 100)
+    subscription = RawSubscription(
+        node, Imu, "/imu/data_raw",
+        lambda batch: (publisher.publish(message(0)), time.sleep(0.01)), QoSProfile(depth=100),
+        is_direct=True)
+    deadline = time.monotonic() + 20
+    while not subscription.subscription.get_publisher_count() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    publisher.publish(message(0))
+    intake = _DirectIntake(node)
+    start = time.monotonic()
+    intake.wait(0.1)
+    assert time.monotonic() - start < 1.0
+
+
+def test_serialised_messages_are_published_the_documented_way_where_there_is_no_other():
+    class Publisher:
+        published = []
+
+        def publish(self, data):
+            self.published.append(data)
+
+    publish_serialized(Publisher(), [b"one", b"two"])
+    assert Publisher.published == [b"one", b"two"]
 
 
 def test_messages_that_did_not_fit_are_counted_as_lost(node):

@@ -5,6 +5,7 @@ import pytest
 from random_models import draw_sensor, model_of
 
 from frac_accel import Corrector, LiveSimulator
+from frac_accel.core import Oscillator
 from frac_accel.errors import FracAccelError
 from frac_accel.model import SensorModel
 
@@ -80,6 +81,10 @@ def random_case(seed):
     """Stream and a maker of correctors; also for sweeps over more seeds."""
     rng = np.random.default_rng([4, seed])
     model = model_of(draw_sensor(rng, RATE, own_axes=0.3))
+    if isinstance(model.core, Oscillator):
+        model.metadata["covariance"] = {
+            "parameters": ["natural_frequency_hz", "damping_ratio"],
+            "matrix": [[0.25, 0.0], [0.0, (0.05 * model.core.damping_ratio)**2]]}
     rate = RATE if rng.random() < 0.6 else 0.0
     noise = 0.1 if rng.random() < 0.5 else None
     kernel = Corrector if rng.random() < 0.8 else LiveSimulator

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import yaml
-from mcap.writer import CompressionType, IndexType, Writer
 
 from frac_accel import message_definitions
 from frac_accel.bag.files import METADATA_NAME
+from frac_accel.bag.mcap_writer import McapWriter
 from frac_accel.bag.qos import Qos, parse_qos, qos_entries, qos_text
 from frac_accel.bag.reader import TopicInfo
 from frac_accel.errors import BagError
@@ -74,12 +75,7 @@ class BagWriter:
             self._stream = open(file, "xb" if in_place else "wb")
         except OSError as error:
             raise BagError(f"{path}: cannot be written: {error.strerror}") from None
-        # An index of no attachments would leave a summary offset that points nowhere.
-        indexes = IndexType.CHUNK | IndexType.MESSAGE | IndexType.METADATA
-        self._writer = Writer(
-            self._stream, compression=CompressionType.ZSTD, index_types=indexes
-        )
-        self._checked(self._writer.start, "ros2", "frac_accel")
+        self._writer = self._checked(McapWriter, self._stream, "ros2", "frac_accel")
 
     def __enter__(self) -> BagWriter:
         return self
@@ -127,24 +123,23 @@ class BagWriter:
         self, topic: str, data: bytes, log_time_ns: int, publish_time_ns: int | None = None
     ) -> None:
         """Append one serialised message of an announced topic; times in ns since the epoch."""
-        count = self.counts[topic]
-        publish_time_ns = log_time_ns if publish_time_ns is None else publish_time_ns
-        if not (0 <= log_time_ns <= _MAX_TIME and 0 <= publish_time_ns <= _MAX_TIME):
-            raise BagError(f"{self.path}: time {log_time_ns} ns on {topic} is out of range")
-        channel_id = self._topics[topic].channel_id
-        self._checked(
-            self._writer.add_message,
-            channel_id,
-            log_time_ns,
-            data,
-            publish_time_ns,
-            count & 0xFFFFFFFF,
-        )
-        self.counts[topic] = count + 1
-        if log_time_ns < self._start_ns:
-            self._start_ns = log_time_ns
-        if log_time_ns > self._end_ns:
-            self._end_ns = log_time_ns
+        self.write_many(topic, [(data, log_time_ns, publish_time_ns)])
+
+    def write_many(self, topic: str, messages: Sequence[tuple[bytes, int, int | None]]) -> None:
+        """Append messages of a topic: data, log time and publish time of each, as `write`."""
+        if not messages:
+            return
+        messages = [
+            (data, log, log if publish is None else publish) for data, log, publish in messages
+        ]
+        times = [time for _, *pair in messages for time in pair]
+        if not 0 <= min(times) <= max(times) <= _MAX_TIME:
+            wrong = min(times) if min(times) < 0 else max(times)
+            raise BagError(f"{self.path}: time {wrong} ns on {topic} is out of range")
+        logs = times[::2]
+        self._checked(self._writer.add_messages, self._topics[topic].channel_id, messages)
+        self.counts[topic] += len(messages)
+        self._start_ns, self._end_ns = min(self._start_ns, min(logs)), max(self._end_ns, max(logs))
 
     def flush(self) -> None:
         """End the chunk and have the disk confirm it: from now on these messages are safe."""

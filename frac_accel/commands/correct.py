@@ -57,18 +57,20 @@ def run(arguments):
         writer.copy_topic(raw, arguments.corrected)
         sink = _Sink(corrector, writer, raw.type_name, arguments.corrected, temperatures)
         for block in reader.blocks(copied):
-            times = list(zip(block.log_times_ns.tolist(), block.publish_times_ns.tolist()))
-            for data, (log, publish) in zip(block.messages, times):
-                writer.write(block.topic.name, data, log, publish)
+            messages = block.messages
+            writer.write_many(block.topic.name, list(zip(
+                messages, block.log_times_ns.tolist(), block.publish_times_ns.tolist())))
             if block.topic.name == raw.name:
-                sink.add(block)
-            bar.update(len(times))
+                sink.add(block, messages)
+            bar.update(len(messages))
         sink.finish()
         counters = corrector.counters
         if not counters["given"]:
             raise BagError(f"{arguments.bag}: topic {arguments.sensor}: nothing could be corrected "
                            f"of {counters['samples']} samples: {fates(counters)}")
-    for warning in reader.warnings:
+    notes = [f"the variance is without the model's parameter uncertainty: {note}"
+             for note in dict.fromkeys(corrector.design.notes) if note]
+    for warning in [*reader.warnings, *notes]:
         print(f"warning: {warning}")
     summary = corrector.design.summary()
     print(f"{arguments.output}: {counters['given']} of {counters['samples']} samples corrected at "
@@ -82,7 +84,7 @@ def run(arguments):
     print(f"  filter delay {summary['filter_delay_s']:.4g} s; sensor's own delay "
           f"{summary['sensor_delay_s']:.4g} s, taken out of the stamps")
     write_json(arguments.json, {"output": str(arguments.output), "counters": counters,
-                                "filters": summary, "warnings": reader.warnings})
+                                "filters": summary, "warnings": [*reader.warnings, *notes]})
 
 
 def _temperatures(reader, topic, model):
@@ -117,16 +119,16 @@ class _Sink:
         self._first = 0
         self._frame = ""
 
-    def add(self, block):
+    def add(self, block, messages):
         if self._type == cdr.POINT_CLOUD2:
-            for data, log in zip(block.messages, block.log_times_ns.tolist()):
+            for data, log in zip(messages, block.log_times_ns.tolist()):
                 samples = cdr.read_point_cloud(data)
                 self._frame, self._log = samples.frame_id, log
                 self._tell_temperature(log)
                 self._write_cloud(self._corrector.process(samples.stamps_ns, samples.values))
             return
         samples = block.samples()
-        self._waiting.extend(zip(block.messages, block.log_times_ns.tolist()))
+        self._waiting.extend(zip(messages, block.log_times_ns.tolist()))
         logs, start = block.log_times_ns, 0
         while start < len(logs):
             self._tell_temperature(logs[start])
@@ -150,19 +152,13 @@ class _Sink:
         if not len(ready):
             return
         # a sample that was never given out is dropped when a later one is
-        messages, logs = [], []
-        for index in ready.index.tolist():
-            while self._first < index:
-                self._waiting.popleft()
-                self._first += 1
-            message, log = self._waiting.popleft()
-            self._first += 1
-            messages.append(message)
-            logs.append(log)
+        indices = ready.index.tolist()
+        passed = [self._waiting.popleft() for _ in range(indices[-1] + 1 - self._first)]
+        messages, logs = zip(*[passed[index - self._first] for index in indices])
+        self._first = indices[-1] + 1
         patched = cdr.replace_samples(self._type, messages, ready.stamps_ns, ready.values,
-                                    ready.variance)
-        for message, log in zip(patched, logs):
-            self._writer.write(self._topic, message, log)
+                                      ready.variance)
+        self._writer.write_many(self._topic, list(zip(patched, logs, logs)))
 
     def _write_cloud(self, ready):
         if len(ready):

@@ -7,9 +7,10 @@ import numpy as np
 
 from ..core import Arx, Oscillator
 from ..effects import Circumstances
-from ..errors import DesignError, FracAccelError
+from ..errors import DesignError, FracAccelError, ModelError
 from ..model import AXES
 from .fitting import LOWEST_SHARE, FilterProblem, evaluate
+from .parameter_uncertainty import design_parameter_uncertainty
 from .static_terms import StaticTermsDesign
 
 # A band ends where the sensor's gain has fallen to this share of its reference gain: the inverse
@@ -40,6 +41,11 @@ class FilterDesign:
         An output belongs to the sample this many before the newest.
     sensor_delay_ns : int
         Sensor's own delay [ns], which the correction takes out of the stamp.
+    parameter_uncertainty : tuple of ParameterUncertainty
+        What the uncertainty of each axis's parameters adds to the variance; None where the model
+        states none, or nothing that can be used.
+    notes : tuple of str
+        For each axis, why what the model states of it cannot be used; empty where it can.
     """
 
     model: object
@@ -48,6 +54,8 @@ class FilterDesign:
     static_terms: tuple
     delay_samples: int
     sensor_delay_ns: int
+    parameter_uncertainty: tuple = (None,) * 3
+    notes: tuple = ("",) * 3
 
     @property
     def warm_up_samples(self):
@@ -69,7 +77,9 @@ class FilterDesign:
                 "noise_gain": axis.noise_gain,
                 "static_gain": axis.filter.static_gain,
                 "taps": len(axis.filter.taps), "poles": len(axis.filter.poles),
-            } for name, axis in zip(AXES, self.axes)},
+                "parameter_uncertainty": uncertainty.summary() if uncertainty else note or "none",
+            } for name, axis, uncertainty, note in zip(
+                AXES, self.axes, self.parameter_uncertainty, self.notes)},
         }
 
 
@@ -154,8 +164,23 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
         return linear, own_terms.solve(delay, linear) if own_terms else None
 
     axes, static_terms = zip(*map(solved, problems, nonlinear))
+    uncertainty, notes = zip(*_parameter_uncertainty(model, problems, delay, axes))
     return FilterDesign(model=model, sampling_rate_hz=rate, axes=axes, static_terms=static_terms,
-                        delay_samples=delay, sensor_delay_ns=sensor_delay_ns)
+                        delay_samples=delay, sensor_delay_ns=sensor_delay_ns,
+                        parameter_uncertainty=uncertainty, notes=notes)
+
+
+def _parameter_uncertainty(model, problems, delay, axes):
+    """`ParameterUncertainty` of each axis, or None and why there is none."""
+    known = {}
+    for name, problem, linear in zip(AXES, problems, axes):
+        if (problem, model.axis(name)) not in known:
+            try:
+                result = design_parameter_uncertainty(model, name, problem, delay, linear), ""
+            except ModelError as error:
+                result = None, str(error)
+            known[problem, model.axis(name)] = result
+        yield known[problem, model.axis(name)]
 
 
 def _delay_with_terms(delay, nonlinear, rate, max_delay_s):

@@ -3,7 +3,11 @@
 import dataclasses
 
 import numpy as np
-from scipy.signal import lfilter
+
+from ..linear_filter import run_filter
+
+# Samples over which `unknown_history` is looked up once.
+_HISTORY_STEP = 8
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -69,6 +73,16 @@ class ParallelFilter:
         decay = np.abs(self.poles) ** (np.asarray(count) - self.lead)[..., None]
         return (np.abs(self.residues) / np.abs(1 - self.poles) * decay).sum(axis=-1)
 
+    def unknown_history_after(self, first, start, count):
+        """`unknown_history` at `count` samples from `start` on, held over a few at a time.
+
+        Where it is looked up depends on `first`, at most `start`, only: not on how the samples are
+        split into blocks.
+        """
+        place = np.arange(start - first, start - first + count) // _HISTORY_STEP
+        looked_up = self.unknown_history(first + _HISTORY_STEP * np.arange(place[0], place[-1] + 1))
+        return looked_up[place - place[0]]
+
     def sections(self):
         """Numerators and denominators of the recursive sections, two poles in each."""
         pairs = []
@@ -100,7 +114,7 @@ class FilterState:
         # lfilter convolves a pure FIR by another, length-dependent route: a zero keeps it away
         links = [(np.asarray(parallel_filter.taps, float), np.array([1.0, 0.0]))]
         links += parallel_filter.sections()
-        self._links = [(b, a, np.outer(level, _steady_state(b, a))) for b, a in links]
+        self._links = [(b, a, np.outer(level, steady_state(b, a))) for b, a in links]
         self._waiting = np.repeat(level[:, None], parallel_filter.lead, axis=1)
 
     def process(self, values):
@@ -111,14 +125,14 @@ class FilterState:
             values, self._waiting = queue[:, :count], queue[:, count:]
         total = None
         for i, (b, a, state) in enumerate(self._links):
-            output, state = lfilter(b, a, values, zi=state)
+            output, state = run_filter(b, a, values, state)
             self._links[i] = (b, a, state)
             total = output if total is None else total + output
         return total
 
 
-def _steady_state(b, a):
-    """State of `lfilter` after a unit input for ever."""
+def steady_state(b, a):
+    """State of `run_filter` after a unit input for ever."""
     order = max(len(a), len(b)) - 1
     b, a = (np.pad(c, (0, order + 1 - len(c))) for c in (b, a))
     gain = b.sum() / a.sum()

@@ -108,28 +108,28 @@ class FilterProblem:
             filter=dataclasses.replace(design.filter, lead=design.filter.lead + wait))
 
     def _solve(self, delay, tolerance):
-        taps, poles = self._structure(delay)
+        taps, poles = self.structure(delay)
         low = self.band[0]
         shift = delay + self.extra_delay
-        inside = self._columns(self.grid, taps, poles)
+        inside = self.columns(self.grid, taps, poles)
         inside *= (np.exp(2j * np.pi * self.grid * shift / self.rate)
                    / self._unit(self.target))[:, None]
         # the fit is worst where a high-pass's band begins: there an error weighs more
         weight = np.sqrt((1 + 4 * (low / np.maximum(self.grid, 1e-300))**2) / len(self.grid))
         inside *= weight[:, None]
-        outside = self._columns(self.outside, taps, poles) * self.outside_weight[:, None]
+        outside = self.columns(self.outside, taps, poles) * self.outside_weight[:, None]
         wanted = weight * np.abs(self.target / self._unit(self.target))
         if low:
             # below a high-pass's band the inverse may rise, but not without end
             below = np.linspace(0, low, 20)
             rise = MOST_RISE * np.abs(self.target[0]) / tolerance
-            inside = np.r_[inside, self._columns(below, taps, poles) / (rise * np.sqrt(len(below)))]
+            inside = np.r_[inside, self.columns(below, taps, poles) / (rise * np.sqrt(len(below)))]
             wanted = np.r_[wanted, np.zeros(len(below))]
         # orthogonal reduction once; each noise weight then solves a small system
         basis, triangle = np.linalg.qr(_real(inside))
         right = basis.T @ np.r_[wanted, np.zeros(len(wanted))]
         noise = np.linalg.qr(_real(outside), mode="r")
-        check = self._columns(self.check, taps, poles)
+        check = self.columns(self.check, taps, poles)
         check *= (np.exp(2j * np.pi * self.check * shift / self.rate)
                   / self._unit(self.check_target))[:, None]
         right_size = np.abs(self.check_target / self._unit(self.check_target))
@@ -164,8 +164,8 @@ class FilterProblem:
         """What errors are relative to: the target, made no smaller than the floor."""
         return target * np.maximum(1.0, self.floor / np.abs(target))
 
-    def _structure(self, delay):
-        """Basis of the taps, and the poles in z."""
+    def structure(self, delay):
+        """Basis of the taps for a delay [samples] up to `longest`, and the poles in z."""
         low, high = self.band
         before = np.ceil(delay + self.extra_delay)
         count = int(before + max(before, np.ceil(TAIL * self.rate / high))) + 2
@@ -210,7 +210,8 @@ class FilterProblem:
         fit = np.linalg.lstsq(_real(smooth), np.r_[target.real, target.imag], rcond=None)[0]
         return bool(np.max(np.abs(target - smooth @ fit)) > 1e-5 * np.max(np.abs(target)))
 
-    def _columns(self, frequency, taps, poles):
+    def columns(self, frequency, taps, poles):
+        """Response of each unknown at frequencies [Hz]: taps, then the poles' sections."""
         z = np.exp(-2j * np.pi * frequency / self.rate)
         columns = [taps.columns(z)]
         for pole in poles:

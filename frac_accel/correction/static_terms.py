@@ -13,7 +13,6 @@ its result through the same band with the same delay.
 import dataclasses
 
 import numpy as np
-from scipy.special import erf
 
 from ..core.bouc_wen import follow_one_way
 from ..effects.base import CORE
@@ -243,6 +242,7 @@ class StaticTermsState:
 
 def _mean_sign(values, variance):
     """Mean of the sign of something that is seen as `values` through noise."""
+    from scipy.special import erf
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(variance > 0, erf(values / np.sqrt(2 * variance)), np.sign(values))
 

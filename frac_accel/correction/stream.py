@@ -8,6 +8,7 @@ import numpy as np
 from ..effects import Circumstances
 from ..errors import FracAccelError
 from .filter import FilterState, ParallelFilter
+from .parameter_uncertainty import ParameterUncertaintyState
 from .static_terms import StaticTermsState
 from .temperature import HeldTemperature
 from .timing import LARGEST, RATE_SAMPLES, SampleClock, estimate_rate
@@ -32,8 +33,9 @@ class Filtered:
         Instants that the values estimate.
     values : ndarray, shape (n, 3)
     variance : ndarray, shape (n, 3)
-        Their variance from the noise of the input, bridged gaps and what is not known of
-        the motion before the start; NaN where the noise is not known.
+        Their variance from the noise of the input, the uncertainty of the model's parameters,
+        bridged gaps and what is not known of the motion before the start; NaN where the noise is
+        not known.
     """
 
     index: np.ndarray
@@ -345,18 +347,19 @@ class Stream:
 
     def _advance(self, run):
         """Run the filters over samples that follow the ones before."""
-        self._waiting_index = np.r_[self._waiting_index, run.index]
-        self._waiting_stamps = np.r_[self._waiting_stamps, run.stamps_ns]
+        self._waiting_index = np.concatenate([self._waiting_index, run.index])
+        self._waiting_stamps = np.concatenate([self._waiting_stamps, run.stamps_ns])
         stated = ~np.isnan(run.variance)
-        # a bridged sample is as warm as the one after it
-        following = np.where(run.index < 0, len(run.index) - 1, np.arange(len(run.index)))
-        following = np.minimum.accumulate(following[::-1])[::-1]
-        values, variance = self._before(
-            run.values, np.where(stated, run.variance, self._noise_variance),
-            run.index[following], run.stamps_ns)
         noise_known = (stated | (self._noise_variance > 0)).all(axis=1)
-        # a bridged sample's variance says nothing of the noise: the sample after it does
-        noise_known = noise_known[following]
+        index = run.index
+        if (index < 0).any():
+            # a bridged sample is as warm as the one after it, and its variance says nothing of
+            # the noise: that of the sample after it does
+            following = np.where(index < 0, len(index) - 1, np.arange(len(index)))
+            following = np.minimum.accumulate(following[::-1])[::-1]
+            index, noise_known = index[following], noise_known[following]
+        values, variance = self._before(
+            run.values, np.where(stated, run.variance, self._noise_variance), index, run.stamps_ns)
         if self._states is None:
             if self._kept is not None:
                 values = np.concatenate([self._kept[0], values])
@@ -373,18 +376,21 @@ class Stream:
         """Bring the filters into the state that they have when their taps are first full."""
         self._kept = None
         self._states = []
-        filters = list(zip(self.design.axes, self.design.static_terms))
+        filters = list(zip(self.design.axes, self.design.static_terms,
+                           self.design.parameter_uncertainty))
         # axes with the same filter run through it together
-        for design, terms in dict.fromkeys(filters):
-            rows = [axis for axis in range(3) if filters[axis] == (design, terms)]
+        for design, terms, uncertainty in dict.fromkeys(filters):
+            rows = [axis for axis in range(3)
+                    if filters[axis] == (design, terms, uncertainty)]
+            rows = slice(None) if len(rows) == 3 else rows
             columns = values[:, rows].T
             # behind a high-pass every steady motion leaves the output at rest
-            level = np.zeros(len(rows)) if design.band_hz[0] else columns.mean(axis=1)
+            level = np.zeros(len(columns)) if design.band_hz[0] else columns.mean(axis=1)
             state = FilterState(design.filter, level)
             state.process(columns)
             head = np.r_[np.zeros(design.filter.lead), np.square(design.filter.impulse_head)]
             noise = FilterState(ParallelFilter(head, np.empty(0), np.empty(0)),
-                                np.zeros(len(rows)))
+                                np.zeros(len(columns)))
             noise.process(variance[:, rows].T)
             later = max(design.noise_gain**2 - head.sum(), 0.0)
             power = np.mean((columns - level[:, None])**2, axis=1)
@@ -392,8 +398,12 @@ class Stream:
             if terms:
                 static = StaticTermsState(terms, columns.mean(axis=1) * (not terms.is_coupled))
                 static.process(columns, variance[:, rows].T)
-            self._states.append((rows, design.filter, state, noise, later, power, static))
-        self._since_start = len(values)
+            doubt = None
+            if uncertainty:
+                doubt = ParameterUncertaintyState(uncertainty, columns.mean(axis=1))
+                doubt.process(columns)
+            self._states.append((rows, design.filter, state, noise, later, power, static, doubt))
+        self._since_start = self._started = len(values)
         # the oldest of the waiting will have been passed over before the first output
         skipped = len(values) - self.design.delay_samples
         fresh = self._waiting_index[:skipped]
@@ -404,33 +414,38 @@ class Stream:
     def _give(self, values, variance, noise_known):
         count = len(values)
         result, spread = np.empty((count, 3)), np.empty((count, 3))
-        since = self._since_start + np.arange(1, count + 1)
-        for rows, parallel_filter, state, noise, later, power, static in self._states:
+        for rows, parallel_filter, state, noise, later, power, static, doubt in self._states:
             result[:, rows] = state.process(values[:, rows].T).T
             known = variance[:, rows].T
-            history = parallel_filter.unknown_history(since)**2
+            history = parallel_filter.unknown_history_after(
+                self._started + 1, self._since_start + 1, count)**2
             spread[:, rows] = (noise.process(known) + later * known + np.outer(power, history)).T
             if static:
-                added, doubt = static.process(values[:, rows].T, known)
+                added, more = static.process(values[:, rows].T, known)
                 result[:, rows] += added.T
-                spread[:, rows] += doubt.T
+                spread[:, rows] += more.T
+            if doubt:
+                spread[:, rows] += doubt.process(values[:, rows].T).T
         spread[~noise_known] = np.nan
         self._since_start += count
         index, stamps = self._waiting_index[:count], self._waiting_stamps[:count]
         self._waiting_index = self._waiting_index[count:]
         self._waiting_stamps = self._waiting_stamps[count:]
         given = index > self._last_given
-        if given.any():
-            self._last_given = int(index[given][-1])
-        self._totals["given"] += int(given.sum())
-        index, stamps = index[given], stamps[given]
-        return Filtered(index, self._stamps(stamps),
-                        self._after(result[given], index, stamps), spread[given])
+        if not given.all():
+            index, stamps = index[given], stamps[given]
+            result, spread = result[given], spread[given]
+        if len(index):
+            self._last_given = int(index[-1])
+        self._totals["given"] += len(index)
+        return Filtered(index, self._stamps(stamps), self._after(result, index, stamps), spread)
 
 
 def _concatenated(parts):
     if not parts:
         return Filtered(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3)),
                         np.empty((0, 3)))
+    if len(parts) == 1:
+        return parts[0]
     return Filtered(*(np.concatenate([getattr(part, field.name) for part in parts])
                       for field in dataclasses.fields(Filtered)))

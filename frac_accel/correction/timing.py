@@ -17,7 +17,8 @@ The stated policy, each case counted:
 import dataclasses
 
 import numpy as np
-from scipy.signal import lfilter
+
+from ..linear_filter import run_filter
 
 RATE_SAMPLES = 100
 JITTER = 0.1
@@ -27,6 +28,8 @@ LARGEST = 1e100
 _FOLLOW = 0.1
 _SCATTER_MEMORY = 0.01
 _CHUNK = 4096
+_FOLLOWING = np.array([_FOLLOW]), np.array([1.0, _FOLLOW - 1.0])
+_SCATTERING = np.array([_SCATTER_MEMORY]), np.array([1.0, _SCATTER_MEMORY - 1.0])
 
 
 def estimate_rate(stamps_ns):
@@ -136,13 +139,15 @@ class SampleClock:
 
     def _accept(self, stamps, values, finite):
         """Number of leading samples that simply follow; the clock is moved on by these."""
-        steps = np.diff(np.r_[self._last, stamps])
+        steps = np.diff(stamps, prepend=self._last)
         ahead = np.arange(self._count + 1, self._count + 1 + len(stamps))
         # time against a clock that started with the first stamp; its slow mean is the clock's error
         late = (stamps - self._origin) - ahead * self.interval_ns
-        mean, _ = lfilter([_FOLLOW], [1.0, _FOLLOW - 1.0], late,
-                          zi=(1.0 - _FOLLOW) * self._offset)
-        error = (late - np.r_[self._offset, mean[:-1]]) / self.interval_ns
+        mean = run_filter(*_FOLLOWING, late[None], (1.0 - _FOLLOW) * self._offset[None])[0][0]
+        error = late.copy()
+        error[0] -= self._offset[0]
+        error[1:] -= mean[:-1]
+        error /= self.interval_ns
         plain = finite & (steps > 0) & (np.abs(error) < MISSING)
         accepted = len(plain) if plain.all() else int(np.argmin(plain))
         if accepted:
@@ -153,9 +158,9 @@ class SampleClock:
 
     def _follow(self, stamps, values, offset):
         increments = np.diff(np.concatenate([self._last_values[None], values]), axis=0)**2
-        scatter, _ = lfilter([_SCATTER_MEMORY], [1.0, _SCATTER_MEMORY - 1.0], increments, axis=0,
-                             zi=(1.0 - _SCATTER_MEMORY) * self._scatter)
-        self._scatter = scatter[-1:]
+        scatter, _ = run_filter(*_SCATTERING, increments.T,
+                                (1.0 - _SCATTER_MEMORY) * self._scatter.T)
+        self._scatter = scatter[:, -1][None]
         self._offset = offset
         self._count += len(stamps)
         self._last, self._last_values = int(stamps[-1]), values[-1]
@@ -202,6 +207,8 @@ class SampleClock:
 
 def _joined(runs):
     """Runs that continue each other made one."""
+    if len(runs) < 2:
+        return runs
     groups = []
     for run in runs:
         if run.restart or not groups:

@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from scipy.special import erf
 
 from ..parameters import parameter
 from .base import DEAD_ZONE, Effect
@@ -27,6 +26,7 @@ class DeadZone(Effect):
 
     def invert(self, values, variance, circumstances):
         """Inside the zone, where only noise is seen, its middle with the zone's variance."""
+        from scipy.special import erf
         with np.errstate(divide="ignore", invalid="ignore"):
             sign = erf(values / np.sqrt(2 * variance))  # mean of the sign behind the noise
         sign = np.where(variance > 0, sign, np.sign(values))

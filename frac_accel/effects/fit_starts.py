@@ -1,10 +1,11 @@
-"""Where the fit of a cause begins: what `Effect.starts` is made of."""
+"""Where the fit of a cause begins: what `Effect.starts` is made of.
+
+scipy is imported where it is used: a running corrector loads the effects, but starts no fit.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.ndimage import uniform_filter1d
 
 
 class Start(NamedTuple):
@@ -52,6 +53,7 @@ def grid(effects):
 
 def bulk_shift(simulated, measured, used):
     """Whole samples by which the measured signal is later than the simulated."""
+    from scipy.fft import irfft, next_fast_len, rfft
     n = len(simulated)
     length = next_fast_len(2 * n, real=True)
     shared = irfft(np.conj(rfft((simulated - simulated[used].mean()) * used, length))
@@ -62,6 +64,8 @@ def bulk_shift(simulated, measured, used):
 
 def spectral_peaks(view, count=3):
     """Frequencies [Hz] of the highest peaks of the residual's smoothed spectrum."""
+    from scipy.fft import rfft
+    from scipy.ndimage import uniform_filter1d
     power = np.abs(rfft(view.residual))**2
     width = max(3, len(power) // 400)
     smooth = uniform_filter1d(power, width)
@@ -78,6 +82,7 @@ def spectral_peaks(view, count=3):
 
 def strongest_line(view):
     """Frequency [Hz], amplitude and phase [rad] of the residual's strongest line, or None."""
+    from scipy.fft import rfft
     values = view.residual - view.residual[view.used].mean() * view.used
     power = np.abs(rfft(values * np.hanning(len(values))))**2
     power[:3] = 0

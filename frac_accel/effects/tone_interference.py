@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from scipy.signal import lfilter
 
 from ..parameters import parameter
 from .base import INTERFERENCE, Effect
@@ -78,6 +77,8 @@ class _Tracker:
         tone = np.cos(angle) + 1j * np.sin(angle)
         moving = values - self._first
         feedback = [1.0, -self._keep]
+        # imported here, as only this cause is worth the time that it takes
+        from scipy.signal import lfilter
         sums, self._sum = lfilter([1.0], feedback, moving * tone.conj(), zi=self._sum)
         squares, self._squares = lfilter([1.0], feedback, moving**2, zi=self._squares)
         weight = (1 - self._keep**number) / (1 - self._keep)

@@ -1,5 +1,6 @@
 """One topic through a filter to another: what `corrector` and `virtual_sensor` have in common."""
 
+import bisect
 import time
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
@@ -7,13 +8,22 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Temperature
 
 from frac_accel.errors import FracAccelError
-from frac_accel.nodes._runtime import INVALID_ENDPOINT, NodeError, RawSubscription
+from frac_accel.nodes._runtime import (
+    INVALID_ENDPOINT,
+    NodeError,
+    RawSubscription,
+    publish_serialized,
+)
 
-# Filtering one sample costs as much as filtering fifty, so messages are taken in small groups:
-# for at most this share of the filter's own delay, and never longer than this.
-_GROUPING_SHARE = 0.25
-_LONGEST_GROUPING_S = 0.005
+# Filtering one sample costs as much as filtering fifty, so above this rate messages are taken in
+# groups, for so long.
+_GROUPED_ABOVE_HZ = 1500.0
+_GROUPING_S = 0.004
 _POLL_S = 0.001
+# Messages that wait for longer than this before what they bring is published count as late.
+LATE_S = 0.05
+# Most messages that are held while a filter is being made.
+_MOST_HELD = 200_000
 
 
 def subscribe_temperature(node, filtered_topics):
@@ -65,6 +75,10 @@ class FilteredTopic:
     unfiltered : int
         Messages that came while there was no filter to be had.
     published : int
+    late : int
+        Messages that waited for longer than `LATE_S`.
+    overflowed : int
+        Messages that were given up because too many were waiting for a filter.
     last_message_s : float or None
         Monotonic time of the last message.
     """
@@ -73,7 +87,7 @@ class FilteredTopic:
                  on_processed=None):
         self.messages = None
         self.failure = ""
-        self.unfiltered = self.published = 0
+        self.unfiltered = self.published = self.late = self.overflowed = self._deepest = 0
         self.last_message_s = None
         self._node = node
         self._worker = worker
@@ -85,7 +99,7 @@ class FilteredTopic:
         self._task = None
         self._hold = self._draining = False
         self._next_s = 0.0
-        self._stream_counters = {}
+        self._stream_counters, self._past_counters = {}, {}
         self._wake = node.create_guard_condition(self._advance)
         try:
             self._publisher = node.create_publisher(
@@ -95,7 +109,7 @@ class FilteredTopic:
         except INVALID_ENDPOINT as error:
             raise NodeError(f"topic {topics[1]} cannot be published: {error}") from None
         self._subscription = RawSubscription(
-            node, message_class, topics[0], self._on_messages, raw_qos(depth))
+            node, message_class, topics[0], self._on_messages, raw_qos(depth), is_direct=True)
 
     @property
     def name(self):
@@ -106,6 +120,11 @@ class FilteredTopic:
     def qos(self):
         """QoS of the input topic."""
         return self._subscription.subscription.qos_profile
+
+    @property
+    def output(self):
+        """The publisher."""
+        return self._publisher
 
     @property
     def stream(self):
@@ -121,9 +140,16 @@ class FilteredTopic:
     def counters(self):
         """Counters of the stream and of the messages, as a new dict of str to int."""
         if self._settled:
-            self._stream_counters = {**self.stream.counters, "malformed": self.messages.malformed}
-        return {**self._stream_counters, "lost": self._subscription.lost,
-                "without_filter": self.unfiltered, "published": self.published}
+            current = {**self.stream.counters, "malformed": self.messages.malformed}
+            self._stream_counters = {name: count + self._past_counters.get(name, 0)
+                                     for name, count in current.items()}
+        return {**self._stream_counters, "lost": self._subscription.lost + self.overflowed,
+                "late": self.late, "without_filter": self.unfiltered, "published": self.published}
+
+    def take_queue_depth(self):
+        """Most messages that were waiting at once since the last call."""
+        depth, self._deepest = max(self._deepest, len(self._intake)), 0
+        return depth
 
     @property
     def _settled(self):
@@ -147,6 +173,15 @@ class FilteredTopic:
         self.messages = messages
         if self._celsius is not None:
             self.stream.set_temperature(self._celsius)
+
+    def begin_anew(self):
+        """Estimate the rate again, from the next messages; what waits in the filter is given up."""
+        if not self._settled:
+            return
+        past = self.counters
+        past["cut_off"] += past.pop("waiting")
+        self._past_counters, self._stream_counters = past, {**past, "waiting": 0}
+        self.messages = None
 
     def prepare(self, model, wishes):
         """Design another model's filter while this one goes on; raises FracAccelError."""
@@ -192,6 +227,9 @@ class FilteredTopic:
 
     def _on_messages(self, batch):
         self._intake += batch
+        if len(self._intake) > _MOST_HELD:
+            self.overflowed += len(self._intake) - _MOST_HELD
+            del self._intake[:-_MOST_HELD]
         if self._draining:
             return
         pause = self._next_s - time.monotonic()
@@ -208,10 +246,7 @@ class FilteredTopic:
 
     def _grouping_s(self):
         design = self.stream.design if self._settled else None
-        if design is None:
-            return _LONGEST_GROUPING_S
-        delay_s = design.delay_samples / design.sampling_rate_hz
-        return min(_GROUPING_SHARE * delay_s, _LONGEST_GROUPING_S)
+        return 0.0 if design and design.sampling_rate_hz < _GROUPED_ABOVE_HZ else _GROUPING_S
 
     def _advance(self):
         """Filter what has been taken in, unless the filter is being made."""
@@ -223,6 +258,7 @@ class FilteredTopic:
             self._submit(self._make, *self._offered)
             return
         batch, self._intake = self._intake, []
+        self._deepest = max(self._deepest, len(batch))
         if self.messages is None:
             self.unfiltered += len(batch)
             return
@@ -232,6 +268,9 @@ class FilteredTopic:
             self._submit(self.messages.process, messages, arrivals_ns)
         else:
             self._publish(self.messages.process(messages, arrivals_ns))
+        # they came in one after the other
+        since_ns = time.time_ns() - int(1e9 * LATE_S)
+        self.late += bisect.bisect_left(arrivals_ns, since_ns)
 
     def _submit(self, function, *arguments):
         self._task = self._worker.submit(function, *arguments)
@@ -255,8 +294,7 @@ class FilteredTopic:
         self._advance()
 
     def _publish(self, processed):
-        for message in processed.messages:
-            self._publisher.publish(message)
+        publish_serialized(self._publisher, processed.messages)
         self.published += len(processed.messages)
         if self._on_processed:
             self._on_processed(processed, time.time_ns())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import re
 import signal
@@ -32,6 +33,8 @@ from frac_accel.errors import FracAccelError
 
 # The longest that a signal or the end of a node's work goes unnoticed.
 _POLL_S = 0.1
+# How often timers, services and all that is not taken directly have their turn beside it.
+_EXECUTOR_PERIOD_S = 0.02
 
 INVALID_ENDPOINT = (
     InvalidTopicNameException,
@@ -55,6 +58,10 @@ class FracAccelNode(Node):
     """
 
     done = False
+
+    def __init__(self, name: str) -> None:
+        self.direct_subscriptions: list[RawSubscription] = []
+        super().__init__(name)
 
     def finish(self) -> None:
         """Complete what the node was doing; nothing by default."""
@@ -113,10 +120,14 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
         node = make_node()
         executor = make_executor()
         executor.add_node(node)
+        direct = _DirectIntake(node)
         while not (stop.requested or node.done):
-            # A bounded wait, because a Python signal handler runs only between two of them, and
-            # because the EventsExecutor of rclpy 7.1 dispatches nothing without a timeout.
-            executor.spin_once(timeout_sec=_POLL_S)
+            # A bounded wait, because a Python signal handler runs only between two of them.
+            if direct.is_possible:
+                direct.wait(_EXECUTOR_PERIOD_S)
+                executor.spin_once(timeout_sec=0)
+            else:
+                executor.spin_once(timeout_sec=_POLL_S)
         node.finish()
         return 0
     except FracAccelError as error:
@@ -196,6 +207,9 @@ class RawSubscription:
         The QoS can be overridden by the ROS parameters
         ``qos_overrides.TOPIC.subscription.{reliability,history,depth}``.
     callback : called with a non-empty list of `RawMessage`
+    is_direct : bool
+        Wait for this topic outside rclpy's executor, whose every wake-up costs as much as
+        filtering fifty samples. Only for a `FracAccelNode` in `run_node`.
 
     Attributes
     ----------
@@ -221,8 +235,13 @@ class RawSubscription:
         callback: Callable[[list[RawMessage]], None],
         qos: QoSProfile,
         callback_group: CallbackGroup | None = None,
+        is_direct: bool = False,
     ) -> None:
         self.lost = 0
+        if is_direct:
+            callback_group = OutsideExecutor()
+            node.direct_subscriptions.append(self)
+        self.callback_group = callback_group
         self._last_sequence: int | None = None
         self._callback = callback
         self._message_class = message_class
@@ -253,9 +272,16 @@ class RawSubscription:
             raise NodeError(f"topic {topic} cannot be subscribed to: {error}") from None
 
     def drain(self) -> None:
-        """Hand over what is waiting now; a node calls it before it ends."""
-        while batch := self._waiting():
+        """Hand over what is waiting, until nothing is; a node calls it before it ends."""
+        while self.take_batch():
+            pass
+
+    def take_batch(self) -> bool:
+        """Hand over what is waiting now, once; whether there was anything."""
+        batch = self._waiting()
+        if batch:
             self._callback(batch)
+        return bool(batch)
 
     def _on_message(self, data: bytes, info) -> None:
         self._callback([self._received(data, info), *self._waiting()])
@@ -277,11 +303,13 @@ class RawSubscription:
         handle = self.subscription.handle
         try:
             with handle:
+                take, message_class, received = (
+                    handle.take_message, self._message_class, self._received)
                 while len(batch) < self._MAX_BATCH:
-                    taken = handle.take_message(self._message_class, True)
+                    taken = take(message_class, True)
                     if taken is None:
                         break
-                    batch.append(self._received(*taken))
+                    batch.append(received(*taken))
         except (AttributeError, TypeError, rclpy_implementation.RCLError) as error:
             self._can_drain = False
             self._logger.warning(f"taking messages one by one: {error}")
@@ -297,6 +325,85 @@ class RawSubscription:
             f"{self.subscription.topic_name}: a publisher offers an incompatible {policy}; "
             "nothing is received from it"
         )
+
+
+def publish_serialized(publisher, messages: Sequence[bytes]) -> None:
+    """Publish serialised messages.
+
+    Through ``publisher.handle``, which rclpy does not document, at a third of the cost that
+    ``publish`` adds to each; where that fails, through ``publish``.
+    """
+    handle = getattr(publisher, "handle", None)
+    publish = getattr(handle, "publish_raw", None)
+    with handle if publish else contextlib.nullcontext():
+        for message in messages:
+            (publish or publisher.publish)(message)
+
+
+class OutsideExecutor(CallbackGroup):
+    """Keeps a subscription out of the executor, for as long as `is_active`."""
+
+    is_active = True
+
+    def can_execute(self, entity):
+        return not self.is_active
+
+    def beginning_execution(self, entity):
+        return not self.is_active
+
+    def ending_execution(self, entity):
+        pass
+
+
+class _DirectIntake:
+    """Waits for the direct subscriptions of a node with a wait set of its own.
+
+    It is what rclpy's executors use themselves, and not documented; where it fails, the executor
+    takes the subscriptions over.
+
+    Attributes
+    ----------
+    is_possible : bool
+    """
+
+    def __init__(self, node: FracAccelNode) -> None:
+        self._subscriptions = node.direct_subscriptions
+        self._logger = node.get_logger()
+        self._wait_set = None
+        self.is_possible = bool(self._subscriptions)
+        if self.is_possible:
+            self._attempt(self._make, node)
+
+    def wait(self, seconds: float) -> None:
+        """Hand over what comes within this time."""
+        end_s = time.monotonic() + seconds
+        while (left_s := end_s - time.monotonic()) > 0 and self.is_possible:
+            for subscription in self._attempt(self._ready, left_s) or ():
+                subscription.take_batch()
+
+    def _make(self, node: FracAccelNode) -> None:
+        self._wait_set = rclpy_implementation.WaitSet(
+            len(self._subscriptions), 0, 0, 0, 0, 0, node.context.handle)
+
+    def _ready(self, seconds: float) -> list[RawSubscription]:
+        self._wait_set.clear_entities()
+        handles = [each.subscription.handle for each in self._subscriptions]
+        for handle in handles:
+            self._wait_set.add_subscription(handle)
+        self._wait_set.wait(int(seconds * 1e9))
+        ready = self._wait_set.get_ready_entities("subscription")
+        return [each for each, handle in zip(self._subscriptions, handles)
+                if handle.pointer in ready]
+
+    def _attempt(self, function, *arguments):
+        try:
+            return function(*arguments)
+        except (AttributeError, TypeError, rclpy_implementation.RCLError) as error:
+            self.is_possible = False
+            for subscription in self._subscriptions:
+                subscription.callback_group.is_active = False
+            self._logger.warning(f"messages are waited for by the executor: {error}")
+            return None
 
 
 class _StopSignals:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 from std_msgs.msg import Float64
@@ -23,6 +22,7 @@ from frac_accel.nodes._filtered_topic import FilteredTopic, raw_qos, subscribe_t
 from frac_accel.nodes._runtime import (
     FracAccelNode,
     NodeError,
+    OutsideExecutor,
     RawSubscription,
     import_message_class,
     normalised,
@@ -31,6 +31,8 @@ from frac_accel.nodes._runtime import (
 
 _PERIOD_S = 1.0
 _REFERENCE_PERIOD_S = 0.1
+# For so long stamps advance at another rate before the filter is made for that.
+_OTHER_RATE_PERIODS = 2
 # Parameters that the filter is designed by, which may change while it runs.
 _DESIGN_PARAMETERS = ("model_file", "bandwidth_hz", "lowest_hz", "max_delay_s")
 _LEVELS = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
@@ -69,7 +71,7 @@ class Corrector(FracAccelNode):
         self._reference_s = None
         self._reference_subscription = RawSubscription(
             self, sample_class, "imu/reference", self._on_reference, raw_qos(depth),
-            callback_group=_TakenByTimer())
+            callback_group=OutsideExecutor())
         self._temperature_subscription = subscribe_temperature(
             self, [channel.topic for channel in self._channels])
         self._figures = {}
@@ -201,6 +203,7 @@ class Corrector(FracAccelNode):
         for channel in used:
             statuses.append(channel.report(period_s, load, silent_s))
             channel.evaluate(self._judge, None if lost else self._reference)
+            channel.follow_rate()
         array = DiagnosticArray(status=statuses)
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(array)
@@ -228,6 +231,7 @@ class _Channel:
         self._findings = Findings()
         self._counters = {}
         self._newest_stamp_ns = None
+        self._other_rate_periods = 0
         self.topic = FilteredTopic(
             node, message_class, topics, node.value("depth"), node.worker,
             lambda model, wishes: make_messages(node.make_stream(model, wishes)), is_optional,
@@ -248,6 +252,19 @@ class _Channel:
             self._publish(figures)
         self._evaluation = worker.submit(evaluate, self._metrics.snapshot(reference, self._design))
 
+    def follow_rate(self):
+        """Begin anew where the sensor has changed the rate that was estimated for it."""
+        rate_hz, design = self._findings.stamp_rate_hz, self._design
+        other = (rate_hz and design and not self._node.value("sample_rate_hz")
+                 and abs(rate_hz / design.sampling_rate_hz - 1) > health.RATE_SHARE)
+        self._other_rate_periods = self._other_rate_periods + 1 if other else 0
+        if self._other_rate_periods >= _OTHER_RATE_PERIODS:
+            self._other_rate_periods = 0
+            self._node.get_logger().warning(
+                f"{self.topic.name}: stamps advance at {rate_hz:.6g} Hz, no longer at "
+                f"{design.sampling_rate_hz:.6g} Hz: the filter is made again")
+            self.topic.begin_anew()
+
     def is_used(self):
         """Whether anybody has ever published on the raw topic."""
         return self.topic.last_message_s is not None or bool(self._publishers())
@@ -264,6 +281,7 @@ class _Channel:
         level, message = health.judge(health.Situation(
             topic=topic.name, model_file=self._node.value("model_file"), failure=topic.failure,
             designing=topic.designing, publishers=self._publishers(),
+            refused_subscribers=self._refused_subscribers(),
             seconds_since_message=silent_s,
             stated_rate_hz=self._node.value("sample_rate_hz"),
             sample_rate_hz=design.sampling_rate_hz if design else None,
@@ -272,6 +290,7 @@ class _Channel:
             reference_silent_s=reference_silent_s))
         figures = {"received_per_s": changes.get("samples", 0) / period_s,
                    "corrected_per_s": changes.get("given", 0) / period_s,
+                   "queue_depth": float(topic.take_queue_depth()),
                    **self._metrics.take_latencies()}
         if design:
             figures["sample_rate_hz"] = design.sampling_rate_hz
@@ -311,18 +330,20 @@ class _Channel:
             result.append(health.Publisher(name, refusal))
         return tuple(result)
 
-
-class _TakenByTimer(CallbackGroup):
-    """Keeps a subscription out of the executor, which would wake for each of its messages."""
-
-    def can_execute(self, entity):
-        return False
-
-    def beginning_execution(self, entity):
-        return False
-
-    def ending_execution(self, entity):
-        pass
+    def _refused_subscribers(self):
+        """Who asks for the corrected topic with a QoS that it does not offer, and why not."""
+        node, topic = self._node, self.topic.output.topic_name
+        # as the others see it: the profile that we asked for leaves much to the middleware
+        offered = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)
+                   if (info.node_namespace, info.node_name) == (node.get_namespace(),
+                                                                node.get_name())]
+        result = []
+        for info in node.get_subscriptions_info_by_topic(topic) if offered else ():
+            compatibility, reason = qos_check_compatible(offered[0], info.qos_profile)
+            if compatibility == QoSCompatibility.ERROR:
+                name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+                result.append(f"{name} ({reason.strip().rstrip(';')})")
+        return tuple(result)
 
 
 def _load(model_file):
@@ -343,6 +364,9 @@ def _in_short(design):
                    f"{min(axis['band_hz'][1] for axis in axes):.4g}",
         **{name: max(axis[name] for axis in axes)
            for name in ("worst_amplitude_error", "worst_phase_error_deg", "noise_gain")},
+        "parameter_uncertainty": "; ".join(dict.fromkeys(
+            known if isinstance(known, str) else known["method"]
+            for known in (axis["parameter_uncertainty"] for axis in axes))),
     }
 
 

@@ -70,7 +70,7 @@ class UncertainAxis:
             name = axis if isinstance(axis, str) else AXES[axis]
             raise ModelError(f"axes.{name}: has a model of its own, of which the covariance says "
                              "nothing")
-        names, matrix = _read(model.metadata.get("covariance"))
+        names, matrix = read_covariance(model.metadata.get("covariance"))
         return cls.given(own, names, matrix)
 
     @classmethod
@@ -208,8 +208,8 @@ class UncertainAxis:
         return float(np.sqrt(np.max(distance / np.maximum(along, floor))))
 
 
-def _read(entry):
-    """Names and matrix of a model file's ``covariance``."""
+def read_covariance(entry):
+    """Names and matrix of a model file's ``covariance``; ModelError where they are not valid."""
     if entry is None:
         raise ModelError("covariance: missing, expected parameters and matrix as identify "
                          "writes them")

@@ -1,0 +1,134 @@
+"""Publisher and sink of the live benchmark, each a process of its own.
+
+Both print ``ready`` once the other side has found them, do their work after a line on stdin, and
+write what they saw to a file.
+"""
+
+import argparse
+import sys
+import threading
+import time
+
+import numpy as np
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import Imu, PointCloud2
+
+from .. import cdr
+from ..benchmark.live import START_NS
+from ..samples import Samples
+from ._runtime import RawSubscription
+
+DEPTH = 20_000
+QOS = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)
+TOPICS = {"imu": ("imu/data_raw", "imu/data", Imu),
+          "blocks": ("accel/blocks_raw", "accel/blocks", PointCloud2)}
+
+
+def stamps_ns(count, rate_hz):
+    """Stamps of `count` samples at a rate."""
+    return START_NS + np.round(np.arange(count) / rate_hz * 1e9).astype(np.int64)
+
+
+def encoded(kind, count, rate_hz, block):
+    """Serialised messages of `count` samples at `rate_hz`, `block` samples in each."""
+    values = np.random.default_rng(0).standard_normal((count, 3))
+    stamps = stamps_ns(count, rate_hz)
+    if kind == "imu":
+        return cdr.encode_samples(cdr.IMU, Samples.of(stamps, values, np.full((count, 3), 1e-4)))
+    return [cdr.encode_point_cloud(Samples.of(stamps[i:i + block], values[i:i + block]))
+            for i in range(0, count, block)]
+
+
+def publish(node, arguments):
+    """Publish at a steady rate; the instants [ns] of sending go to the file."""
+    topic, _, message_class = TOPICS[arguments.kind]
+    publisher = node.create_publisher(message_class, topic, QOS)
+    messages = encoded(arguments.kind, arguments.count, arguments.rate, arguments.block)
+    rate_hz = arguments.rate / arguments.block
+    if not arguments.alone:
+        _wait(lambda: publisher.get_subscription_count())
+    _ready()
+    sent = np.zeros(len(messages), np.int64)
+    start = time.monotonic()
+    for i, message in enumerate(messages):
+        left = start + i / rate_hz - time.monotonic()
+        if left > 0:
+            time.sleep(left)
+        sent[i] = time.time_ns()
+        publisher.publish(message)
+    publisher.wait_for_all_acked(rclpy.duration.Duration(seconds=10))
+    np.save(arguments.file, sent)
+
+
+def receive(node, arguments):
+    """Take all until a second line comes; stamps and instants [ns] of arrival go to the file."""
+    _, topic, message_class = TOPICS[arguments.kind]
+    batches = []
+    RawSubscription(node, message_class, topic, batches.append, QOS)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    stop = threading.Event()
+
+    def spin():
+        while not stop.is_set():
+            executor.spin_once(timeout_sec=0.05)
+            # in groups, since this process shares the other core with the publisher
+            time.sleep(0.003)
+
+    thread = threading.Thread(target=spin)
+    thread.start()
+    if not arguments.alone:
+        _wait(lambda: node.count_publishers(topic))
+    _ready()
+    sys.stdin.readline()
+    stop.set()
+    thread.join()
+    messages = [message for batch in batches for message in batch]
+    arrivals = np.array([message.received_time_ns for message in messages], np.int64)
+    if arguments.kind == "imu":
+        stamps = cdr.read_samples(cdr.IMU, [message.data for message in messages]).stamps_ns
+    else:
+        parts = [cdr.read_point_cloud(message.data).stamps_ns for message in messages]
+        stamps = np.concatenate([np.empty(0, np.int64), *parts])
+        arrivals = np.repeat(arrivals, [len(part) for part in parts])
+    np.save(arguments.file, np.stack([stamps, arrivals]))
+
+
+def _ready():
+    print("ready", flush=True)
+    sys.stdin.readline()
+
+
+def _wait(condition, seconds=30.0):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > deadline:
+            sys.exit("nobody on the other side")
+        time.sleep(0.02)
+
+
+def main():
+    """Entry point."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("role", choices=("publish", "receive"))
+    parser.add_argument("file")
+    parser.add_argument("--kind", default="imu", choices=TOPICS)
+    parser.add_argument("--rate", type=float, default=1000.0)
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--block", type=int, default=1)
+    parser.add_argument("--alone", action="store_true", help="do not wait for the node")
+    arguments = parser.parse_args()
+    rclpy.init()
+    node = Node(f"benchmark_{arguments.role}")
+    try:
+        (publish if arguments.role == "publish" else receive)(node, arguments)
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == "__main__":
+    main()
