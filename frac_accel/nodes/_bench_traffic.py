@@ -14,6 +14,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu, PointCloud2
 
 from .. import cdr
@@ -78,7 +79,7 @@ def receive(node, arguments):
             # in groups, since this process shares the other core with the publisher
             time.sleep(0.003)
 
-    thread = threading.Thread(target=spin)
+    thread = threading.Thread(target=spin, daemon=True)
     thread.start()
     if not arguments.alone:
         _wait(lambda: node.count_publishers(topic))
@@ -121,10 +122,13 @@ def main():
     parser.add_argument("--block", type=int, default=1)
     parser.add_argument("--alone", action="store_true", help="do not wait for the node")
     arguments = parser.parse_args()
-    rclpy.init()
+    # signals end the process by KeyboardInterrupt, not by a context that vanishes under the threads
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Node(f"benchmark_{arguments.role}")
     try:
         (publish if arguments.role == "publish" else receive)(node, arguments)
+    except KeyboardInterrupt:
+        sys.exit(1)
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
