@@ -79,14 +79,16 @@ def receive(node, arguments):
             # in groups, since this process shares the other core with the publisher
             time.sleep(0.003)
 
-    thread = threading.Thread(target=spin, daemon=True)
+    thread = threading.Thread(target=spin)
     thread.start()
-    if not arguments.alone:
-        _wait(lambda: node.count_publishers(topic))
-    _ready()
-    sys.stdin.readline()
-    stop.set()
-    thread.join()
+    try:
+        if not arguments.alone:
+            _wait(lambda: node.count_publishers(topic))
+        _ready()
+        sys.stdin.readline()
+    finally:
+        stop.set()
+        thread.join()
     messages = [message for batch in batches for message in batch]
     arrivals = np.array([message.received_time_ns for message in messages], np.int64)
     if arguments.kind == "imu":
