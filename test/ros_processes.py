@@ -29,6 +29,7 @@ def ros_domain() -> Iterator[dict[str, str]]:
             continue
         with lock:
             yield {
+                "FASTRTPS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "fastdds_discovery.xml"),
                 "ROS_DOMAIN_ID": str(domain),
                 "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
                 "PYTHONUNBUFFERED": "1",

@@ -226,8 +226,10 @@ def _process(command, environment, pipe):
 
 def _environment():
     path = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
+    profile = _ROOT / "config" / "fastdds_discovery.xml"
+    discovery = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(profile)} if profile.is_file() else {}
     # a domain of its own, beyond those that anybody sets by hand and below the ephemeral ports
-    return {**os.environ, "PYTHONPATH": path, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    return {**discovery, **os.environ, "PYTHONPATH": path, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "ROS_DOMAIN_ID": str(80 + os.getpid() % 20)}
 
 
@@ -245,7 +247,7 @@ def run(rounds):
                 else:
                     one = pass_through(relay_command(name), rate_hz, 3.0)
                 passages.setdefault((name, rate_hz), []).append(one)
-            # twice, as the middleware may take another three seconds to discover the node
+            # twice, as the middleware may take its time to discover the node
             starts += [seconds_to_first_output(model_file, 1000.0) for _ in range(2)]
             model_file, design = write_model(folder, 300_000.0)
             passages.setdefault("blocks", []).append(pass_through(
@@ -297,8 +299,8 @@ def _figures(passages, starts):
                "us"),
         Figure("live", "start of the corrector to its first output, median",
                float(np.median(starts)), "s", most=1.5),
-        Figure("live", "start of the corrector to its first output, discovered at once",
-               min(starts), "s", most=1.5),
+        Figure("live", "start of the corrector to its first output, longest", max(starts), "s",
+               most=1.5),
         Figure("live", "cores busy with something else, median", float(np.median(busy)), ""),
         Figure("live", "cores busy with something else, most", max(busy), ""),
     ]
