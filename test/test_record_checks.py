@@ -14,6 +14,7 @@ from frac_accel.bag import RAW_TOPIC, REFERENCE_TOPIC
 from frac_accel.cli import main
 from frac_accel.errors import IdentificationError
 from frac_accel.identification.clipping import lattice_step
+from frac_accel.identification.excitation import require_excitation
 from frac_accel.pair import make_pair
 from frac_accel.samples import Samples
 
@@ -136,6 +137,17 @@ def test_random_sensors_the_right_way_round_are_not_refused():
                 ((s, s.values[:, 0].std() * rng.uniform(0.01, 0.3)) for s in (reference, raw)))
         check = run(reference, raw).excitation
         assert (check.clipped, check.standing) == (0, 0)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_one_sine_of_any_length_and_phase_is_refused(seed):
+    rng = np.random.default_rng(seed)
+    rate_hz, frequency, cycles = np.exp(rng.uniform(np.log([200, 0.005, 5]),
+                                                    np.log([20_000, 0.4, 400])))
+    phase = 2 * np.pi * frequency * np.arange(max(100, int(cycles / frequency)))
+    sine = np.sin(phase + rng.uniform(0, 2 * np.pi)) + rng.uniform(-1, 1)
+    with pytest.raises(IdentificationError, match="excites only"):
+        require_excitation(sine + 1e-3 * rng.normal(size=len(sine)), rate_hz, 4)
 
 
 def test_one_sine_is_told_where_more_is_needed(tmp_path, capsys):

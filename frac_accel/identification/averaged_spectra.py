@@ -7,7 +7,7 @@ from scipy.fft import rfft
 from scipy.signal import get_window
 
 
-def segment_spectra(values, window, length):
+def segment_spectra(values, window, length, weighted_mean=False):
     """Spectra of segments that overlap by half, each without its mean.
 
     Parameters
@@ -17,6 +17,9 @@ def segment_spectra(values, window, length):
         As `scipy.signal.get_window` names it.
     length : int
         Of a segment, at most n.
+    weighted_mean : bool
+        Whether the mean is that under the window, which leaves nothing in the lowest lines. With
+        the plain one, a sine that does not fill a segment with whole periods leaks into them.
 
     Returns
     -------
@@ -26,7 +29,8 @@ def segment_spectra(values, window, length):
     """
     segments = np.lib.stride_tricks.sliding_window_view(values, length)[::length - length // 2]
     taper = _taper(window, length)
-    spectra = rfft((segments - segments.mean(axis=1, keepdims=True)) * taper, axis=1)
+    mean = segments @ taper / taper.sum() if weighted_mean else segments.mean(axis=1)
+    spectra = rfft((segments - mean[:, None]) * taper, axis=1)
     # each other line stands for its conjugate as well
     spectra[:, 1:(length + 1) // 2] *= np.sqrt(2)
     return spectra

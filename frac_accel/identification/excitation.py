@@ -142,7 +142,7 @@ def persistent_excitation(reference, sampling_rate_hz):
     lines_hz : list of float
         Frequencies of the lines, or places within a stretch of continuous spectrum.
     """
-    frequency, power = _spectrum(reference, sampling_rate_hz)
+    frequency, power = _spectrum(reference, sampling_rate_hz, weighted_mean=True)
     strong = np.flatnonzero(power > _FLOOR * power.max())
     stretches = np.split(strong, np.flatnonzero(np.diff(strong) > 1) + 1) if len(strong) else []
     lines = []
@@ -229,10 +229,10 @@ def _energy(reference, valid=None):
     return np.cumsum(power if valid is None else power * valid)
 
 
-def _spectrum(reference, sampling_rate_hz):
+def _spectrum(reference, sampling_rate_hz, weighted_mean=False):
     length = _segment(reference)
     return (np.fft.rfftfreq(length, 1 / sampling_rate_hz),
-            power_of(segment_spectra(reference, "blackmanharris", length)))
+            power_of(segment_spectra(reference, "blackmanharris", length, weighted_mean)))
 
 
 def _segment(reference):
