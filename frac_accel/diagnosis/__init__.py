@@ -186,8 +186,6 @@ def _require_direction(engine, axis, start):
     """Refuse a pair that the model fits far better the other way round."""
     p = engine.problem
     reference, used = p.record.reference[:, p.axis], p.used
-    if not np.isfinite(p.measured).all():
-        return
     swapped = AxisSimulator(p.measured, p.rate, p.record.temperature_c)
     backward = _shared(reference, swapped.simulate(p.baseline.axis(p.axis)), used)
     if backward > _ALIKE and 1 - backward < _EXCHANGED * (1 - _shared(p.measured, start, used)):
