@@ -26,8 +26,8 @@ def follow_one_way(z, change, beta, gamma):
         if abs(x) > 0.05:
             saturation = -math.expm1(x) / k
         else:  # its series, far faster
-            saturation = change * (
-                1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6)))))
+            saturation = change * (1 + x * (1 / 2 + x * (1 / 6 + x * (
+                1 / 24 + x * (1 / 120 + x * (1 / 720))))))
         end = z + (1 - k * z) * saturation
         if z * change >= 0 or end * z > 0:
             return end

@@ -1,6 +1,7 @@
 """Fit of named causes to a record by simulation error."""
 
 import dataclasses
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -17,61 +18,14 @@ from ..simulation import AxisSimulator
 _EDGE = 64
 _ITERATIONS = 12
 _STEP = 1e-3
+# Steps of a nonlinear core in each sampling interval: for the output (wrong by at most 3e-4 of what
+# the cause adds, where measured) and for its derivatives (ten times that, which bends no fit).
+_STEPS = 4
+_STEPS_OF_SLOPES = 2
 # Outputs of the other axes that are kept.
 _KEPT = 8
 # A gain of this share of one sample's error changes nothing that the data can tell.
 _SMALL_GAIN = 1e-2
-
-
-@dataclasses.dataclass(frozen=True)
-class Fitted:
-    """Causes with the parameters that describe a record best.
-
-    Attributes
-    ----------
-    effects : dict of str to Effect
-    simulated : ndarray, shape (n,)
-        Output with them, free motion of the time before the record included.
-    residual : ndarray, shape (n,)
-        Measured less simulated [output units]; 0 where a sample does not count.
-    cost : float
-        Sum of the squares of the residual.
-    jacobian : ndarray, shape (n, p)
-        Derivatives of the output by the unknowns, clear of free motions.
-    unknowns : tuple of Unknown
-    theta : ndarray, shape (p,)
-    free : ndarray, shape (n, m)
-        Orthonormal free motions.
-    settled : bool
-        Whether more iterations would gain nothing that counts.
-    """
-
-    effects: dict
-    simulated: np.ndarray
-    residual: np.ndarray
-    cost: float
-    jacobian: np.ndarray
-    unknowns: tuple
-    theta: np.ndarray
-    free: np.ndarray
-    settled: bool
-
-    @property
-    def causes(self):
-        """Names of the causes."""
-        return frozenset(self.effects)
-
-
-class _Point(NamedTuple):
-    """Output and error with certain parameters."""
-
-    effects: dict
-    simulated: np.ndarray
-    columns: np.ndarray
-    free: np.ndarray
-    left: np.ndarray | None
-    residual: np.ndarray
-    cost: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,6 +39,74 @@ class Unknown:
     low: float
     high: float
     step: float
+
+
+class Point(NamedTuple):
+    """Output and error with certain parameters.
+
+    Attributes
+    ----------
+    effects : dict of str to Effect
+    simulated : ndarray, shape (n,)
+        Output with them, without what the time before the record may have left.
+    columns, free : ndarray, shape (n, m)
+        Free motions that this may be, and an orthonormal basis of them.
+    left : ndarray, shape (m,), or None
+        Size of each column in the record.
+    residual : ndarray, shape (n,)
+        Measured less simulated and free motions [output units]; 0 where a sample does not count.
+    cost : float
+        Sum of the squares of the residual.
+    """
+
+    effects: dict
+    simulated: np.ndarray
+    columns: np.ndarray
+    free: np.ndarray
+    left: np.ndarray | None
+    residual: np.ndarray
+    cost: float
+
+
+@dataclasses.dataclass(eq=False)
+class Fitted:
+    """Causes with the parameters that describe a record best.
+
+    Attributes
+    ----------
+    problem : Problem
+    point : Point
+        Its attributes are those of the fit, too.
+    unknowns : tuple of Unknown
+    theta : ndarray, shape (p,)
+    settled : bool
+        Whether more iterations would gain nothing that counts.
+    rough : bool
+        Whether steps and iterations were spared.
+    """
+
+    problem: "Problem"
+    point: Point
+    unknowns: tuple
+    theta: np.ndarray
+    settled: bool = False
+    rough: bool = False
+
+    effects = property(lambda self: self.point.effects)
+    simulated = property(lambda self: self.point.simulated)
+    free = property(lambda self: self.point.free)
+    residual = property(lambda self: self.point.residual)
+    cost = property(lambda self: self.point.cost)
+
+    @property
+    def causes(self):
+        """Names of the causes."""
+        return frozenset(self.effects)
+
+    @functools.cached_property
+    def jacobian(self):
+        """Derivatives of the output by the unknowns, shape (n, p), clear of free motions."""
+        return self.problem.slopes(self)
 
 
 class Problem:
@@ -117,12 +139,13 @@ class Problem:
         """Number of samples that count."""
         return int(self.used.sum())
 
-    def simulator(self, axis):
-        """Simulator of one axis."""
-        if axis not in self._simulators:
-            self._simulators[axis] = AxisSimulator(
-                self.record.reference[:, axis], self.rate, self.record.temperature_c)
-        return self._simulators[axis]
+    def simulator(self, axis, steps=_STEPS):
+        """Simulator of one axis, with as many steps in each sampling interval."""
+        if (axis, steps) not in self._simulators:
+            self._simulators[axis, steps] = AxisSimulator(
+                self.record.reference[:, axis], self.rate, self.record.temperature_c,
+                steps_per_sample=steps)
+        return self._simulators[axis, steps]
 
     def axis_model(self, effects, axis=None):
         """Model of an axis (default: the diagnosed one) with these causes."""
@@ -139,20 +162,20 @@ class Problem:
         others = tuple(e for e in model.effects if e.cause != "time_delay")
         return AxisModel(model.core, (*others, TimeDelay(model.delay_s - lag)))
 
-    def simulate(self, effects, across=True):
+    def simulate(self, effects, across=True, steps=_STEPS):
         """Output of the axis with these causes, shape (n,); without what comes across if asked."""
         self.calls += 1
         model = self._on_stamps(self.axis_model(effects))
-        simulator = self.simulator(self.axis)
+        simulator = self.simulator(self.axis, steps)
         values = simulator.respond(model)
         for effect in model.effects:
             if effect.stage != CROSS_AXIS:
                 values = effect.simulate(values, simulator.circumstances)
             elif across:
-                values = values + self._across(effects, effect)
+                values = values + self._across(effects, effect, steps)
         return values
 
-    def _across(self, effects, cross):
+    def _across(self, effects, cross, steps):
         """What the other axes add."""
         total = np.zeros(len(self.record))
         for other, name in enumerate(AXES):
@@ -161,12 +184,13 @@ class Problem:
                 continue
             model = self._on_stamps(self.axis_model(effects, other))
             before = tuple(e for e in model.effects if e.stage < CROSS_AXIS)
-            if (other, before) not in self._others:
+            key = other, steps, before
+            if key not in self._others:
                 while len(self._others) >= _KEPT:
                     del self._others[next(iter(self._others))]
-                self._others[other, before] = self.simulator(other).simulate(
+                self._others[key] = self.simulator(other, steps).simulate(
                     AxisModel(model.core, before))
-            total += share * self._others[other, before]
+            total += share * self._others[key]
         return total
 
     def change(self, effects, cause, effect):
@@ -244,8 +268,17 @@ class Problem:
         part.__dict__.update(self.__dict__, used=used)
         return part
 
-    def fit(self, effects, iterations=_ITERATIONS):
+    def fit(self, effects, iterations=_ITERATIONS, rough=False, hopeless=np.inf):
         """Parameters of these causes that describe the record best, found from those given.
+
+        Parameters
+        ----------
+        effects : dict of str to Effect
+        iterations : int
+        rough : bool
+            With as few steps of a nonlinear core as derivatives need.
+        hopeless : float
+            Cost above which a fit ends that an iteration does not improve by half.
 
         Returns
         -------
@@ -254,21 +287,33 @@ class Problem:
         unknowns = tuple(unknown for cause in effects
                          for unknown in self.unknowns(effects[cause]))
         theta = np.array([_to_theta(getattr(effects[u.cause], u.name), u) for u in unknowns])
-        here, damping, settled = self._point(dict(effects)), 0.0, not unknowns
-        jacobian = self.jacobian(here, unknowns, theta)
-        for _ in range(iterations if unknowns else 0):
-            gram, slope = jacobian.T @ jacobian, jacobian.T @ here.residual
+        point = self._point(dict(effects), rough)
+        return self._improved(Fitted(self, point, unknowns, theta, rough=rough), iterations,
+                              hopeless)
+
+    def finished(self, fit):
+        """A rough fit with the steps and iterations that it was spared."""
+        finer = Fitted(self, self._point(fit.effects, False), fit.unknowns, fit.theta)
+        finer.jacobian = fit.jacobian
+        return self._improved(finer)
+
+    def _improved(self, here, iterations=_ITERATIONS, hopeless=np.inf):
+        """A fit with more iterations."""
+        damping, here.settled = 0.0, not here.unknowns
+        for _ in range(iterations if here.unknowns else 0):
+            gram, slope = here.jacobian.T @ here.jacobian, here.jacobian.T @ here.residual
             small = _SMALL_GAIN * here.cost / self.count
             there = None
             for _ in range(8):
                 step = _solve(gram + damping * np.diag(np.diag(gram)), slope)
-                if damping < 1e-2 and step @ slope < small:
-                    settled = True
+                if step @ slope < small:
+                    here.settled = damping < 1e-2
                     break
-                trial = np.array([np.clip(value + np.clip(change, -1, 1), u.low, u.high)
-                                  for value, change, u in zip(theta, step, unknowns)])
+                theta = np.array([np.clip(value + np.clip(change, -1, 1), u.low, u.high)
+                                  for value, change, u in zip(here.theta, step, here.unknowns)])
                 try:
-                    there = self._point(self.replaced(here.effects, unknowns, trial))
+                    there = self._point(self.replaced(here.effects, here.unknowns, theta),
+                                        here.rough)
                 except FracAccelError:
                     there = None
                 if there is not None and there.cost < here.cost:
@@ -276,18 +321,17 @@ class Problem:
                 there, damping = None, max(5 * damping, 1e-3)
             if there is None:
                 break
-            settled = here.cost - there.cost < small and damping < 1e-2
+            gained = here.cost - there.cost
+            here = Fitted(self, there, here.unknowns, theta, gained < small and damping < 1e-2,
+                          here.rough)
             damping = damping / 10 if damping > 1e-6 else 0.0
-            theta, here = trial, there
-            jacobian = self.jacobian(here, unknowns, theta)
-            if settled:
+            if here.settled or here.cost > hopeless and gained < here.cost:
                 break
-        return Fitted(here.effects, here.simulated, here.residual, here.cost, jacobian, unknowns,
-                      theta, here.free, settled)
+        return here
 
-    def _point(self, effects):
-        """Output and error with these parameters; raises FracAccelError where it has no bound."""
-        simulated = self.simulate(effects)
+    def _point(self, effects, rough):
+        """`Point` with these parameters; raises FracAccelError where the motion has no bound."""
+        simulated = self.simulate(effects, steps=_STEPS_OF_SLOPES if rough else _STEPS)
         if not np.isfinite(simulated).all():
             raise FracAccelError("the motion has no bound")
         columns = self.free_columns(effects)
@@ -295,25 +339,30 @@ class Problem:
         error = (self.measured - simulated) * self.used
         residual = error - free @ (free.T @ error)
         left = np.linalg.lstsq(columns, error - residual, rcond=1e-10)[0] if free.size else None
-        return _Point(effects, simulated, columns, free, left, residual,
-                      float(residual @ residual))
+        return Point(effects, simulated, columns, free, left, residual,
+                     float(residual @ residual))
 
-    def jacobian(self, point, unknowns, theta):
-        """Derivatives of the output by the unknowns, shape (n, p)."""
-        columns = np.zeros((len(self.record), len(unknowns)))
+    def slopes(self, fit):
+        """Derivatives of the output by the unknowns of a fit, shape (n, p)."""
+        point, theta = fit.point, fit.theta
+        columns = np.zeros((len(self.record), len(theta)))
         forced = any(map(acts_on_spring, point.effects.values()))
-        for i, unknown in enumerate(unknowns):
+        steps = _STEPS_OF_SLOPES if forced else _STEPS
+        before = point.simulated
+        if forced and not fit.rough:
+            before = self.simulate(point.effects, steps=steps)
+        for i, unknown in enumerate(fit.unknowns):
             for step in (unknown.step, -unknown.step):
                 moved = theta.copy()
                 moved[i] = np.clip(theta[i] + step, unknown.low, unknown.high)
                 if moved[i] == theta[i]:
                     continue
                 try:
-                    new = self.replaced(point.effects, unknowns, moved)
+                    new = self.replaced(point.effects, fit.unknowns, moved)
                     if forced and not acts_on_spring(point.effects[unknown.cause]):
                         change = self.change(point.effects, unknown.cause, new[unknown.cause])
                     else:
-                        change = self.simulate(new) - point.simulated
+                        change = self.simulate(new, steps=steps) - before
                 except FracAccelError:
                     continue
                 if point.left is not None:

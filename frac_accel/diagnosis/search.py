@@ -50,30 +50,32 @@ class Search:
 
     def fit(self, effects):
         """Fitted set of causes, from the parameters given unless it is known."""
-        key = frozenset(effects)
-        if key not in self.fits:
-            self.fits[key] = self.problem.fit(effects)
-            self.log(f"fit {sorted(key - set(self.base))}: {self.fits[key].cost:.6g}")
-        return self.fits[key]
+        known = self.fits.get(frozenset(effects))
+        if known is None or known.rough:
+            self._keep(self.problem.finished(known) if known else self.problem.fit(effects))
+        return self.fits[frozenset(effects)]
+
+    def _keep(self, fit):
+        self.fits[fit.causes] = fit
+        self.log(f"fit {sorted(fit.causes - set(self.base))}: {fit.cost:.6g}")
 
     def fit_all(self, sets):
         """Fitted sets by cost; those that fall far behind are not fitted to the end."""
-        trials = []
+        trials, best = {}, np.inf
         for effects in sets:
+            key = frozenset(effects)
             try:
-                trials.append(self.fits.get(frozenset(effects))
-                              or self.problem.fit(effects, _TRIAL))
+                trials[key] = self.fits.get(key) or self.problem.fit(
+                    effects, _TRIAL, rough=True, hopeless=_HOPELESS * best)
             except FracAccelError:
                 continue  # a motion without bound describes no record
-        best, fits = min((fit.cost for fit in trials), default=0.0), []
-        for trial in trials:
-            key = trial.causes
-            if key not in self.fits:
-                far = trial.settled or trial.cost > _HOPELESS * best
-                self.fits[key] = trial if far else self.problem.fit(trial.effects)
-                self.log(f"fit {sorted(key - set(self.base))}: {self.fits[key].cost:.6g}")
-            fits.append(self.fits[key])
-        return sorted(fits, key=lambda fit: fit.cost)
+            best = min(best, trials[key].cost)
+        for key, trial in trials.items():
+            if trial.rough and trial.cost <= _HOPELESS * best:
+                trial = self.problem.finished(trial)
+            if trial is not self.fits.get(key):
+                self._keep(trial)
+        return sorted((self.fits[key] for key in trials), key=lambda fit: fit.cost)
 
     def view(self, fitted):
         p = self.problem
