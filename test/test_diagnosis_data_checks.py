@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from frac_accel.diagnosis import integrity
+from frac_accel.diagnosis.record import Record
 from frac_accel.pair import slots_of
 from frac_accel.samples import Samples
 
@@ -67,3 +68,32 @@ def test_samples_keep_their_places_where_stamps_scatter_widely(scatter):
     rng = np.random.default_rng(3)
     place = np.sort(np.arange(5000) + rng.normal(0, scatter, 5000))
     assert np.array_equal(slots_of(place), np.arange(5000))
+
+
+@pytest.mark.parametrize("lost, most", [(0.0, 0.15), (0.01, 0.12)])
+def test_rate_is_right_where_stamps_scatter(lost, most):
+    """A late stamp makes an interval look like two, in one of the first 64 in a tenth of records."""
+    rng = np.random.default_rng(4)
+    n = 4000
+    for _ in range(100):
+        kept = rng.random(n) >= lost
+        stamps = (np.arange(n) + rng.normal(0, rng.uniform(0.05, most), n)) / RATE
+        pair = Record.of(samples(rng.normal(size=n)),
+                         samples(rng.normal(size=kept.sum()), stamps[kept]))
+        assert len(pair) >= n - 1 - 10 * lost
+        assert pair.valid.sum() == pytest.approx(kept.sum(), abs=1)
+
+
+def test_temperature_follows_a_course_that_bends():
+    rng = np.random.default_rng(5)
+    t = np.arange(12_000) / RATE
+    period_s = rng.uniform(8, 20)
+    celsius = 25 + 12 * np.sin(2 * np.pi * t / period_s + rng.uniform(0, 6))
+    every = slice(None, None, 50)
+    stamps = np.round(t * 1e9).astype(np.int64)
+    # a repeated stamp and a missing value must not matter
+    given = (np.r_[stamps[every], stamps[-50]], np.r_[celsius[every], np.nan])
+    record = Record.of(samples(rng.normal(size=12_000)), samples(rng.normal(size=12_000)),
+                       temperature=given)
+    inside = slice(100, -100)
+    assert np.max(np.abs(record.temperature_c - celsius)[inside]) < 2e-4
