@@ -19,8 +19,8 @@ _SCATTER = 0.3
 _RARE = 1e-3
 _NEIGHBOURS = 15
 _FIRST_PART = 64
-# Scatter [intervals] of stamps that are as regular as clocks make them, and of those that look as if
-# counted wrongly (0.29: as likely here as there).
+# Scatter [intervals] of stamps that are as regular as clocks make them, and of those that look
+# wrongly counted (0.29: as likely here as there).
 _REGULAR = 1e-3
 _SCATTERED = 0.2
 

@@ -72,7 +72,7 @@ def test_samples_keep_their_places_where_stamps_scatter_widely(scatter):
 
 @pytest.mark.parametrize("lost, most", [(0.0, 0.15), (0.01, 0.12)])
 def test_rate_is_right_where_stamps_scatter(lost, most):
-    """A late stamp makes an interval look like two, in one of the first 64 in a tenth of records."""
+    """A late stamp makes an interval look like two: in the first 64 of a tenth of records."""
     rng = np.random.default_rng(4)
     n = 4000
     for _ in range(100):
