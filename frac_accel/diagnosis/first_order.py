@@ -9,19 +9,20 @@ from ..core.static_force import StaticForce
 from ..effects.base import CORE
 
 
-def force_response(simulator, model, effect, sampling_rate_hz):
+def force_response(model, effect, motion, sampling_rate_hz):
     """What a small force adds to the output of a linear sensor.
 
-    The force N that belongs to the linear motion acts on the linear core: the first term of the
-    Born series of the equation of motion.
+    The force N that belongs to a motion acts on the linear core: the first term of the Born series
+    of the equation of motion.
 
     Parameters
     ----------
-    simulator : AxisSimulator
     model : AxisModel
         Without forces.
     effect : Effect
         One that adds a force.
+    motion : ndarray, shape (n,)
+        Of the mass [output units].
     sampling_rate_hz : float
 
     Returns
@@ -29,8 +30,6 @@ def force_response(simulator, model, effect, sampling_rate_hz):
     ndarray, shape (n,)
     """
     core = model.effective_core
-    before = type(model)(core, tuple(e for e in model.effects if e.stage < CORE))
-    motion = simulator.respond(before)
     force = static_force(effect.add_force(StaticForce()), motion, sampling_rate_hz)
     convolution = Convolution(force - force[0], sampling_rate_hz, abs(model.delay_s))
     s = convolution.s

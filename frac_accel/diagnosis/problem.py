@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.oscillator import tail_rates
-from ..effects.base import CROSS_AXIS, GAIN, Effect
+from ..effects.base import CORE, CROSS_AXIS, GAIN, Effect
 from ..effects.time_delay import TimeDelay
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel
@@ -131,7 +131,7 @@ class Problem:
         edge = min(_EDGE, len(record) // 16)
         self.used[:edge] = self.used[-edge:] = False
         self._simulators = {}
-        self._last, self._others = (None, None), {}
+        self._last, self._moved, self._others = (None, None), (None, None), {}
         self.calls = 0
 
     @property
@@ -196,16 +196,18 @@ class Problem:
     def change(self, effects, cause, effect):
         """First-order change of the output, shape (n,), when a cause is added or changed.
 
-        Forces of the spring act on the linear motion, other causes as if there were no such forces,
-        and what comes across from the other axes stays as it is: cheap, and right for small ones.
+        Forces of the spring act on the motion as it is, other causes as if there were no such
+        forces, and what comes across from the other axes stays as it is: cheap, and right for small
+        ones.
         """
         linear = {name: other for name, other in effects.items()
                   if not acts_on_spring(other) and name != cause}
         model = self._on_stamps(self.axis_model(linear))
         if acts_on_spring(effect):
-            added = self.force(model, effect)
+            motion = self._motion({name: other for name, other in effects.items() if name != cause})
+            added = self.force(model, effect, motion)
             if cause in effects:
-                added = added - self.force(model, effects[cause])
+                added = added - self.force(model, effects[cause], motion)
             for later in model.effects:
                 # gains after the core act on what it adds as well; the rest is nearly the same
                 if later.stage == GAIN and later.cause != "sensitivity_error":
@@ -215,10 +217,18 @@ class Problem:
         across = effect.stage == CROSS_AXIS
         return self.simulate({**linear, cause: effect}, across) - self._remembered(before, across)
 
-    def force(self, model, effect):
-        """First-order response to a force."""
+    def force(self, model, effect, motion):
+        """First-order response to a force along a motion."""
         from .first_order import force_response
-        return force_response(self.simulator(self.axis), model, effect, self.rate)
+        return force_response(model, effect, motion, self.rate)
+
+    def _motion(self, effects):
+        """Motion of the mass with these causes, shape (n,) [output units]; the last one is kept."""
+        model = self.axis_model(effects)
+        model = AxisModel(model.core, tuple(e for e in model.effects if e.stage <= CORE))
+        if self._moved[0] != model:
+            self._moved = model, self.simulator(self.axis).respond(model)
+        return self._moved[1]
 
     def _remembered(self, effects, across):
         """Output with these causes; the last one is kept."""
