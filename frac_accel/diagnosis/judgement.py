@@ -168,7 +168,8 @@ def judge(engine, best, found, fixed, loose, sensor):
                 if g.reduction < _RELEVANT or g.ci95[0] <= 0]
         if not idle:
             break
-        best = engine.search.without(best, min(idle, key=lambda cause: gains[cause].reduction))
+        less = engine.search.without(best, min(idle, key=lambda cause: gains[cause].reduction))
+        best = engine.search.fit(less.effects)
     left = engine.left(best)
     stds = engine.uncertainties(best)
     findings, suspects = [], []

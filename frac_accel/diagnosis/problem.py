@@ -335,7 +335,7 @@ class Problem:
             here = Fitted(self, there, here.unknowns, theta, gained < small and damping < 1e-2,
                           here.rough)
             damping = damping / 10 if damping > 1e-6 else 0.0
-            if here.settled or here.cost > hopeless and gained < here.cost:
+            if gained < (here.cost if here.cost > hopeless else small):
                 break
         return here
 

@@ -59,9 +59,9 @@ class Search:
         self.fits[fit.causes] = fit
         self.log(f"fit {sorted(fit.causes - set(self.base))}: {fit.cost:.6g}")
 
-    def fit_all(self, sets):
-        """Fitted sets by cost; those that fall far behind are not fitted to the end."""
-        trials, best = {}, np.inf
+    def fit_all(self, sets, best=np.inf):
+        """Fitted sets by cost; those that fall far behind (a cost) are not fitted to the end."""
+        trials = {}
         for effects in sets:
             key = frozenset(effects)
             try:
@@ -189,7 +189,8 @@ class Search:
 
     def without(self, fitted, cause):
         """The same set without one cause, fitted anew."""
-        return self.fit({name: effect for name, effect in fitted.effects.items() if name != cause})
+        less = {name: effect for name, effect in fitted.effects.items() if name != cause}
+        return next(iter(self.fit_all([less], fitted.cost)), None) or self.fit(less)
 
 
 def _orthonormal(columns):
