@@ -15,13 +15,14 @@ parameters, they belong to draws of these instead. The c_k are those of an uncer
 """
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import ModelError
-from ..linear_filter import run_filter
 from ..parameters import number
-from .filter import steady_state
+from .filter import FilterState
+from .fitting import TAIL
 
 # Of the standard uncertainty at each frequency: permitted error of the filters, and what may be
 # left out of them.
@@ -29,6 +30,10 @@ _TOLERANCE = 0.02
 _NEGLECTED = 0.01
 # Below this share of its largest value over the band, the uncertainty is not fitted.
 _FLOOR = 0.03
+# Lengths that are tried, over that of the inverse, and the most noise that a shorter one may let
+# through, over that of the inverse: in the variance, 4 %.
+_LENGTHS = (0.06, 0.09, 0.12, 0.18, 0.25, 0.5, 1)
+_NOISE_SHARE = 0.2
 _NOISE_WEIGHTS = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-5)
 # Of the poles that carry the inverse's long memory, the sensitivities need every third.
 _THINNED = 2
@@ -42,12 +47,8 @@ class ParameterUncertainty:
 
     Attributes
     ----------
-    taps : ndarray, shape (k, n_taps)
-        Of each filter.
-    sections : tuple of (ndarray, ndarray)
-        Numerators and denominators of recursive sections, which all filters share.
-    mix : ndarray, shape (k, n_sections)
-        What each filter takes of each section.
+    filters : tuple of ParallelFilter
+        F_k.
     constants : ndarray, shape (k,)
         c_k, of the offset.
     constant_variance : float
@@ -64,9 +65,7 @@ class ParameterUncertainty:
         Parameters in the covariance that the linear response does not depend on.
     """
 
-    taps: np.ndarray
-    sections: tuple
-    mix: np.ndarray
+    filters: tuple
     constants: np.ndarray
     constant_variance: float
     lead: int
@@ -78,7 +77,7 @@ class ParameterUncertainty:
     def summary(self):
         """Plain values, for reports and diagnostics."""
         return {"method": self.method, "nonlinearity": self.nonlinearity,
-                "worst_error": self.worst_error, "filters": len(self.taps),
+                "worst_error": self.worst_error, "filters": len(self.filters),
                 "left_out": list(self.left_out)}
 
 
@@ -93,36 +92,23 @@ class ParameterUncertaintyState:
     """
 
     def __init__(self, design, level):
-        self._design = design
-        links = [(taps, np.array([1.0, 0.0])) for taps in design.taps] + list(design.sections)
-        self._links = [(b, a, np.outer(level, steady_state(b, a))) for b, a in links]
+        self._states = [FilterState(one, level) for one in design.filters]
+        self._constants = design.constants.tolist()
+        self._constant_variance = design.constant_variance
         self._waiting = np.repeat(level[:, None], design.lead, axis=1)
-        self._shares = design.mix.T[:, :, None, None].copy()
-        self._constants = design.constants[:, None, None]
 
     def process(self, values):
         """Variance that belongs to the next samples; shape (k, n) in and out."""
-        design = self._design
-        if design.lead:
+        if self._waiting.shape[1]:
             queue = np.concatenate([self._waiting, values], axis=1)
             values, self._waiting = np.split(queue, [values.shape[1]], axis=1)
-        outputs = []
-        for i, (b, a, state) in enumerate(self._links):
-            output, state = run_filter(b, a, values, state)
-            self._links[i] = (b, a, state)
-            outputs.append(output)
-        count = len(design.taps)
-        if not count:
-            return np.full(values.shape, design.constant_variance)
-        sums = np.stack(outputs[:count])
-        for shares, output in zip(self._shares, outputs[count:]):
-            sums += shares * output
-        sums += self._constants
-        sums *= sums
-        total = sums[0]
-        for square in sums[1:]:
-            total += square
-        total += design.constant_variance
+        total = np.full(values.shape, self._constant_variance)
+        for state, constant in zip(self._states, self._constants):
+            output = state.process(values)
+            if constant:
+                output += constant
+            output *= output
+            total += output
         return total
 
 
@@ -167,32 +153,44 @@ def design_parameter_uncertainty(model, name, problem, delay, linear):
         raise ModelError("covariance: it cannot be propagated, the response changes without bound")
     if not relative.any():
         return ParameterUncertainty(
-            np.empty((0, 1)), (), np.empty((0, 0)), np.empty(0), float(np.sum(constants**2)), 0,
-            method, nonlinearity, 0.0, left_out)
+            (), np.empty(0), float(np.sum(constants**2)), 0, method, nonlinearity, 0.0, left_out)
     unit = np.maximum(relative, _FLOOR * relative.max())
     changes, constants, rest = _principal(changes, constants, unit)
-    wait = max(0, delay - problem.longest)
-    taps, poles = problem.structure(delay - wait)
-    poles = _thinned(poles)
-    phase = np.exp(2j * np.pi * frequency * (delay - wait + problem.extra_delay) / problem.rate)
-    scale = phase / (target * unit)
-    columns = problem.columns(frequency, taps, poles) * scale[:, None]
-    outside = problem.columns(problem.outside, taps, poles) \
-        * (problem.outside_weight / relative.max())[:, None]
-    unknowns, error = _fitted(columns, changes / unit, outside)
-    sections = []
-    for pole in poles:
-        if not pole.imag:
-            sections.append((np.array([(1 - pole).real, 0.0]), np.array([1.0, -pole.real])))
-        elif pole.imag > 0:
-            size, denominator = abs(1 - pole)**2, np.array([1.0, -2 * pole.real, abs(pole)**2])
-            sections += [(np.array([size, 0.0, 0.0]), denominator),
-                         (np.array([0.0, size, 0.0]), denominator)]
+    fit = _shortest(problem, delay, frequency, target, changes, unit, linear.noise_gain)
     return ParameterUncertainty(
-        taps=np.array([taps.taps(column[:taps.unknowns]) for column in unknowns.T]),
-        sections=tuple(sections), mix=unknowns[taps.unknowns:].T.copy(), constants=constants,
-        constant_variance=rest, lead=problem.lead + wait, method=method, nonlinearity=nonlinearity,
-        worst_error=error, left_out=left_out)
+        filters=fit.filters, constants=constants, constant_variance=rest, lead=fit.lead,
+        method=method, nonlinearity=nonlinearity, worst_error=fit.error, left_out=left_out)
+
+
+class _Fit(NamedTuple):
+    filters: tuple
+    lead: int
+    error: float
+
+
+def _shortest(problem, delay, frequency, target, changes, unit, noise_gain):
+    """Shortest filters that are as exact as the inverse's own length allows or as wanted.
+
+    Noise of the samples passes them, too; what it adds to the variance stays a small share of what
+    it makes through the inverse.
+    """
+    own = min(delay, problem.longest)
+    for share in _LENGTHS:
+        short = int(np.ceil(share * own))
+        wait = delay - short
+        taps, poles = problem.structure(short, share * TAIL)
+        poles = _thinned(poles)
+        phase = np.exp(2j * np.pi * frequency * (short + problem.extra_delay) / problem.rate)
+        columns = problem.columns(frequency, taps, poles) * (phase / (target * unit))[:, None]
+        outside = problem.columns(problem.outside, taps, poles) \
+            * (problem.outside_weight / unit.max())[:, None]
+        unknowns, error = _fitted(columns, changes / unit, outside)
+        filters = tuple(dataclasses.replace(problem.filter_of(column, taps, poles), lead=0)
+                        for column in unknowns.T)
+        noise = np.sqrt(sum(one.noise_gain**2 for one in filters))
+        if error <= _TOLERANCE and noise <= _NOISE_SHARE * noise_gain:
+            break
+    return _Fit(filters, problem.lead + wait, error)
 
 
 def _uncertain_axis(model, name):
