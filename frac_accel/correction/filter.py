@@ -6,8 +6,9 @@ import numpy as np
 
 from ..linear_filter import run_filter, run_sections
 
-# Samples over which `unknown_history` is looked up once.
+# Samples over which `unknown_history` is looked up once, and how many such at a time.
 _HISTORY_STEP = 8
+_HISTORY_PIECE = 128
 # Poles closer to one than this do not run in series with others.
 _SLOWEST_IN_CHAIN = 3e-7
 # lfilter convolves a pure FIR by another, length-dependent route: a zero keeps it away.
@@ -77,16 +78,6 @@ class ParallelFilter:
         decay = np.abs(self.poles) ** (np.asarray(count) - self.lead)[..., None]
         return (np.abs(self.residues) / np.abs(1 - self.poles) * decay).sum(axis=-1)
 
-    def unknown_history_after(self, first, start, count):
-        """`unknown_history` at `count` samples from `start` on, held over a few at a time.
-
-        Where it is looked up depends on `first`, at most `start`, only: not on how the samples are
-        split into blocks.
-        """
-        place = np.arange(start - first, start - first + count) // _HISTORY_STEP
-        looked_up = self.unknown_history(first + _HISTORY_STEP * np.arange(place[0], place[-1] + 1))
-        return looked_up[place - place[0]]
-
     def chains(self):
         r"""The same filter as taps beside chains of second-order sections, which run much faster.
 
@@ -127,6 +118,34 @@ class ParallelFilter:
                           for over, under in zip(_in_twos(zeros), _in_twos(distance))])
         chain[0, :3] *= size
         return taps, [chain, *chains]
+
+
+class UnknownHistory:
+    """Square of `ParallelFilter.unknown_history` from sample to sample.
+
+    It is looked up every few samples, in pieces that do not depend on how the samples are split.
+
+    Parameters
+    ----------
+    parallel_filter : ParallelFilter
+    first : int
+        Samples since the start, at the first that is asked for.
+    """
+
+    def __init__(self, parallel_filter, first):
+        self._filter = parallel_filter
+        self._next = first
+        self._left = np.empty(0)
+
+    def squared(self, count):
+        """At the next `count` samples."""
+        while len(self._left) < count:
+            at = self._next + _HISTORY_STEP * np.arange(_HISTORY_PIECE)
+            self._next += _HISTORY_STEP * _HISTORY_PIECE
+            weight = np.repeat(self._filter.unknown_history(at)**2, _HISTORY_STEP)
+            self._left = np.concatenate([self._left, weight])
+        result, self._left = self._left[:count], self._left[count:]
+        return result
 
 
 def _in_twos(distance):
