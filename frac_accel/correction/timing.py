@@ -144,7 +144,7 @@ class SampleClock:
     def _accept(self, stamps, values, finite):
         """Number of leading samples that simply follow; the clock is moved on by these."""
         steps = np.empty_like(stamps)
-        steps[0] = stamps[0] - self._last
+        np.subtract(stamps[:1], self._last, out=steps[:1])
         np.subtract(stamps[1:], stamps[:-1], out=steps[1:])
         ahead = np.arange(self._count + 1, self._count + 1 + len(stamps))
         # time against a clock that started with the first stamp; its slow mean is the clock's error
