@@ -7,7 +7,9 @@ the parameters, and the mean of such a quadratic form is a sum of squares,
 
 .. math:: u^2 = \sum_k (F_k * y + c_k)^2 ,
 
-of a few filters that run on the raw samples beside the inverse. To first order,
+of a few filters that run on the raw samples beside the inverse. A nonlinear spring's part of the
+inverse is linear in its coefficients, so that each of these has a signal of its own, which joins
+the sum with what the parameters move it by. To first order,
 :math:`\Delta_\delta = -\sum_i \delta_i \, \partial \ln H / \partial \theta_i`, and the F_k belong
 to the roots of the covariance (A. Link, C. Elster, *Meas. Sci. Technol.* 20 (2009) 055104, have the
 same for the coefficients of a digital filter). Where the inverse does not depend linearly on the
@@ -23,6 +25,7 @@ from ..errors import ModelError
 from ..parameters import number
 from .filter import FilterState
 from .fitting import TAIL
+from .static_terms import coefficients
 
 # Of the standard uncertainty at each frequency: permitted error of the filters, and what may be
 # left out of them.
@@ -38,6 +41,10 @@ _NOISE_WEIGHTS = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-5)
 # Of the poles that carry the inverse's long memory, the sensitivities need every third.
 _THINNED = 2
 _DRAWS = 400
+# Relative change of a response that is none.
+_ROUNDING = 1e-9
+# Step of a central difference, of the parameter.
+_STEP = 1e-5
 _MOST_FREQUENCIES = 2000
 
 
@@ -49,8 +56,12 @@ class ParameterUncertainty:
     ----------
     filters : tuple of ParallelFilter
         F_k.
-    constants : ndarray, shape (k,)
-        c_k, of the offset.
+    constants : ndarray, shape (m,)
+        c_k, of the offset; those beyond the number of filters stand without one.
+    parts : tuple
+        Of the nonlinear spring's terms; see `StaticTermsState`.
+    shares : ndarray, shape (m, n_parts)
+        What each square takes of these.
     constant_variance : float
         Of what the offset adds beside the filters.
     lead : int
@@ -62,11 +73,13 @@ class ParameterUncertainty:
     worst_error : float
         Of the filters in the band, over the standard uncertainty at each frequency.
     left_out : tuple of str
-        Parameters in the covariance that the linear response does not depend on.
+        Parameters in the covariance that are not in the variance.
     """
 
     filters: tuple
     constants: np.ndarray
+    parts: tuple
+    shares: np.ndarray
     constant_variance: float
     lead: int
     method: str
@@ -93,20 +106,31 @@ class ParameterUncertaintyState:
 
     def __init__(self, design, level):
         self._states = [FilterState(one, level) for one in design.filters]
-        self._constants = design.constants.tolist()
+        self._states += [None] * (len(design.constants) - len(self._states))
+        self._added = list(zip(design.constants.tolist(), design.shares.tolist()))
         self._constant_variance = design.constant_variance
         self._waiting = np.repeat(level[:, None], design.lead, axis=1)
 
-    def process(self, values):
-        """Variance that belongs to the next samples; shape (k, n) in and out."""
+    def process(self, values, parts=()):
+        """Variance that belongs to the next samples; shape (k, n) in and out.
+
+        Parameters
+        ----------
+        values : ndarray, shape (k, n)
+        parts : list of ndarray, shape (k, n)
+            What the parts of the spring add to the corrected samples.
+        """
+        shape = values.shape
         if self._waiting.shape[1]:
             queue = np.concatenate([self._waiting, values], axis=1)
-            values, self._waiting = np.split(queue, [values.shape[1]], axis=1)
-        total = np.full(values.shape, self._constant_variance)
-        for state, constant in zip(self._states, self._constants):
-            output = state.process(values)
+            values, self._waiting = queue[:, :shape[1]], queue[:, shape[1]:]
+        total = np.full(shape, self._constant_variance)
+        for state, (constant, shares) in zip(self._states, self._added):
+            output = state.process(values) if state else np.zeros(shape)
             if constant:
                 output += constant
+            for share, part in zip(shares, parts):
+                output += share * part
             output *= output
             total += output
         return total
@@ -144,22 +168,27 @@ def design_parameter_uncertainty(model, name, problem, delay, linear):
     step = -(-len(problem.check) // _MOST_FREQUENCIES)
     frequency, target = problem.check[::step], problem.check_target[::step]
     s = 2j * np.pi * np.maximum(frequency, 1e-9 * problem.rate)
-    changes, constants, method, nonlinearity = _changes(uncertain, s, offset_gain)
-    moved = np.abs(uncertain.slopes(s[:: max(1, len(s) // 50)])).max(axis=1) > 0
+    parts = _parts(uncertain.axis)
+    changes, constants, shares, method, nonlinearity = _changes(uncertain, s, offset_gain, parts)
+    slopes = np.abs(uncertain.slopes(s[:: max(1, len(s) // 50)])).max(axis=1)
+    moved = slopes * np.where(uncertain.values, np.abs(uncertain.values), 1.0) > _ROUNDING
+    moved |= np.any(_part_slopes(uncertain, parts), axis=0)
     left_out = tuple(parameter for parameter, is_moved in zip(uncertain.names, moved)
                      if not is_moved and parameter != "offset")
     relative = np.sqrt(np.sum(np.abs(changes)**2, axis=0))
     if not np.isfinite(relative).all():
         raise ModelError("covariance: it cannot be propagated, the response changes without bound")
-    if not relative.any():
-        return ParameterUncertainty(
-            (), np.empty(0), float(np.sum(constants**2)), 0, method, nonlinearity, 0.0, left_out)
+    if relative.max() < _ROUNDING:
+        constants, shares, rest = _without_filters(constants, shares)
+        return ParameterUncertainty((), constants, parts, shares, rest, 0, method, nonlinearity,
+                                    0.0, left_out)
     unit = np.maximum(relative, _FLOOR * relative.max())
-    changes, constants, rest = _principal(changes, constants, unit)
+    changes, constants, shares, rest = _principal(changes, constants, shares, unit)
     fit = _shortest(problem, delay, frequency, target, changes, unit, linear.noise_gain)
     return ParameterUncertainty(
-        filters=fit.filters, constants=constants, constant_variance=rest, lead=fit.lead,
-        method=method, nonlinearity=nonlinearity, worst_error=fit.error, left_out=left_out)
+        filters=fit.filters, constants=constants, parts=parts, shares=shares,
+        constant_variance=rest, lead=fit.lead, method=method, nonlinearity=nonlinearity,
+        worst_error=fit.error, left_out=left_out)
 
 
 class _Fit(NamedTuple):
@@ -215,43 +244,86 @@ def _uncertain_axis(model, name):
     return UncertainAxis.given(own, *read_covariance(stated))
 
 
-def _changes(uncertain, s, offset_gain):
-    """Relative changes of the inverse (k, m), those of the offset (k,), and how they were found.
+def _parts(axis):
+    """Parts of an axis's nonlinear spring that have a coefficient."""
+    if not axis.static_force:
+        return ()
+    return tuple(part for part, value in coefficients(axis, axis).items() if value)
 
-    The mean square of a change over the parameters is the sum of squares over k.
+
+def _part_slopes(uncertain, parts):
+    """Derivatives of the parts' coefficients by the parameters, shape (n_parts, p)."""
+    result = np.zeros((len(parts), len(uncertain.values)))
+    for i, value in enumerate(uncertain.values if parts else ()):
+        step = np.zeros(len(uncertain.values))
+        step[i] = _STEP * (abs(value) or 1.0)
+        beside = [(sign, uncertain.at(uncertain.values + sign * step)) for sign in (-1, 1)]
+        beside = [(sign, axis or uncertain.axis, axis is not None) for sign, axis in beside]
+        length = step[i] * sum(is_there for *_, is_there in beside)
+        if length:
+            result[:, i] = sum(sign * _part_values(axis, uncertain, parts)
+                               for sign, axis, _ in beside) / length
+    return result
+
+
+def _part_values(axis, uncertain, parts):
+    known = coefficients(axis, uncertain.axis)
+    return np.array([known[part] for part in parts])
+
+
+def _changes(uncertain, s, offset_gain, parts):
+    """How the inverse moves with the parameters.
+
+    Returns
+    -------
+    changes : ndarray, shape (k, m)
+        Relative changes; their mean square over the parameters is the sum of squares over k.
+    constants : ndarray, shape (k,)
+        Those of the offset.
+    shares : ndarray, shape (k, n_parts)
+        Those of the coefficients of the spring's parts.
+    method : str
+    nonlinearity : float
     """
     from ..uncertainty.parameters import LINEAR
     place = uncertain.names.index("offset") if "offset" in uncertain.names else None
 
     def change(drawn):
         inverse = 1 / uncertain.ratio(drawn, s) - 1
+        inverse[np.abs(inverse) < 1e-4 * _ROUNDING] = 0
         return np.concatenate([inverse.real, inverse.imag])
 
     nonlinearity = uncertain.nonlinearity(change, whole=True)
     if nonlinearity <= LINEAR:
         roots = uncertain.directions()
-        constants = np.zeros(len(roots)) if place is None else offset_gain * roots[place]
-        return -roots.T @ uncertain.slopes(s), constants, "first order", nonlinearity
+        constants = np.zeros(roots.shape[1]) if place is None else offset_gain * roots[place]
+        return (-roots.T @ uncertain.slopes(s), constants,
+                roots.T @ _part_slopes(uncertain, parts).T, "first order", nonlinearity)
     drawn = uncertain.draws(_DRAWS)
     changes = np.array([1 / uncertain.ratio(one, s) - 1 for one in drawn])
-    constants = np.zeros(_DRAWS)
+    constants, shares = np.zeros(_DRAWS), np.zeros((_DRAWS, len(parts)))
     if place is not None:
         constants = offset_gain * np.array([_offset(one) - uncertain.values[place]
                                             for one in drawn])
-    return changes / np.sqrt(_DRAWS), constants / np.sqrt(_DRAWS), "Monte Carlo", nonlinearity
+    if parts:
+        shares = np.array([_part_values(one, uncertain, parts) for one in drawn])
+        shares -= _part_values(uncertain.axis, uncertain, parts)
+    share = np.sqrt(_DRAWS)
+    return changes / share, constants / share, shares / share, "Monte Carlo", nonlinearity
 
 
 def _offset(axis):
     return sum(effect.offset for effect in axis.effects if effect.cause == "offset")
 
 
-def _principal(changes, constants, unit):
+def _principal(changes, constants, shares, unit):
     """Fewest changes with nearly the same sum of squares at all frequencies.
 
     Returns
     -------
     changes : ndarray, shape (k, m)
-    constants : ndarray, shape (k,)
+    constants, shares : ndarray, shape (k',) and (k', n_parts)
+        With what stands without a filter behind those that have one.
     rest : float
         Sum of squares of the other constants.
     """
@@ -259,11 +331,21 @@ def _principal(changes, constants, unit):
     gram = (weighted @ weighted.conj().T).real
     size, rotation = np.linalg.eigh(gram)
     rotation = rotation[:, np.argsort(size)[::-1]]
-    changes, constants = rotation.T @ changes, rotation.T @ constants
+    changes, constants, shares = (rotation.T @ each for each in (changes, constants, shares))
     # what would be missing after the first k, at the worst frequency
     missing = np.cumsum((np.abs(changes / unit)**2)[::-1], axis=0)[::-1].max(axis=1)
     count = int(np.sum(missing > _NEGLECTED**2))
-    return changes[:count], constants[:count], float(np.sum(constants[count:]**2))
+    more_constants, more_shares, rest = _without_filters(constants[count:], shares[count:])
+    return (changes[:count], np.r_[constants[:count], more_constants],
+            np.r_[shares[:count], more_shares], rest)
+
+
+def _without_filters(constants, shares):
+    """Fewest constants and shares with the same sum of squares, and a constant for the rest."""
+    if not shares.any():
+        return np.empty(0), np.empty((0, shares.shape[1])), float(np.sum(constants**2))
+    triangle = np.linalg.qr(np.c_[constants, shares], mode="r")
+    return triangle[:, 0], triangle[:, 1:], 0.0
 
 
 def _fitted(columns, wanted, outside):

@@ -405,14 +405,15 @@ class Stream:
             noise.process(variance[:, rows].T)
             later = max(design.noise_gain**2 - head.sum(), 0.0)
             power = np.mean((columns - level[:, None])**2, axis=1)
-            static = None
+            static, parts = None, ()
             if terms:
-                static = StaticTermsState(terms, columns.mean(axis=1) * (not terms.is_coupled))
-                static.process(columns, variance[:, rows].T)
+                static = StaticTermsState(terms, columns.mean(axis=1) * (not terms.is_coupled),
+                                          uncertainty.parts if uncertainty else ())
+                parts = static.process(columns, variance[:, rows].T)[2]
             doubt = None
             if uncertainty:
                 doubt = ParameterUncertaintyState(uncertainty, columns.mean(axis=1))
-                doubt.process(columns)
+                doubt.process(columns, parts)
             history = (UnknownHistory(design.filter, len(values) + 1)
                        if len(design.filter.poles) else None)
             self._states.append((rows, state, noise, later, history, power[:, None], static,
@@ -436,12 +437,13 @@ class Stream:
                 total += later * known
             if history:
                 total += power * history.squared(count)
+            parts = ()
             if static:
-                added, more = static.process(own, known)
+                added, more, parts = static.process(own, known)
                 corrected += added
                 total += more
             if doubt:
-                total += doubt.process(own)
+                total += doubt.process(own, parts)
             result[rows], spread[rows] = corrected, total
         result, spread = result.T, spread.T
         if noise_known is not None:
