@@ -68,6 +68,30 @@ def test_it_is_the_propagation_over_the_whole_record(kind, seed):
         assert np.sqrt(np.mean((found - wanted)**2)) < 0.03 * np.sqrt(np.mean(wanted**2))
 
 
+@pytest.mark.parametrize("damping_order", [1.0, 0.6])
+def test_a_slow_sensor_needs_few_taps_for_its_uncertainty(damping_order):
+    """Where the inverse is long, the sensitivity filters need not be, and are as exact."""
+    core = {"natural_frequency_hz": 0.02 * RATE_HZ, "damping_ratio": 0.2,
+            "damping_order": damping_order}
+    std = {"natural_frequency_hz": 0.4, "damping_ratio": 0.01, "sensitivity": 0.002}
+    if damping_order != 1:
+        std["damping_order"] = 0.01
+    model = model_of(core, std)
+    corrector = Corrector(model, RATE_HZ, noise_std=1e-9)
+    inverse, design = corrector.design.axes[0], corrector.design.parameter_uncertainty[0]
+    assert len(inverse.filter.taps) > 150
+    assert max(len(one.taps) for one in design.filters) < 30
+    assert design.worst_error <= 0.02
+    loud = np.sqrt(sum(one.noise_gain**2 for one in design.filters))
+    assert loud <= 0.2 * inverse.noise_gain
+    values = motion(np.random.default_rng(5), 8000, 0.02 * RATE_HZ)
+    result = corrector.process(np.arange(8000) * 500_000, values)
+    expected = corrected_uncertainty(model, result.values, RATE_HZ).variance[2000:-400]
+    found = result.variance[2000:-400]
+    assert np.sqrt(np.mean((np.sqrt(found) - np.sqrt(expected))**2)) \
+        < 0.03 * np.sqrt(np.mean(expected))
+
+
 def test_noise_and_parameters_add_up():
     model = model_of({"natural_frequency_hz": 200.0, "damping_ratio": 0.3}, {"sensitivity": 0.02})
     certain = SensorModel(model.core)
