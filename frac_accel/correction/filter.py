@@ -1,6 +1,7 @@
 """Stable, causal filter of the correction: taps and a bank of recursive sections in parallel."""
 
 import dataclasses
+import functools
 
 import numpy as np
 
@@ -78,6 +79,7 @@ class ParallelFilter:
         decay = np.abs(self.poles) ** (np.asarray(count) - self.lead)[..., None]
         return (np.abs(self.residues) / np.abs(1 - self.poles) * decay).sum(axis=-1)
 
+    @functools.cached_property
     def chains(self):
         r"""The same filter as taps beside chains of second-order sections, which run much faster.
 
@@ -179,7 +181,7 @@ class FilterState:
 
     def __init__(self, parallel_filter, level):
         self._waiting = np.repeat(level[:, None], parallel_filter.lead, axis=1)
-        self._taps, chains = parallel_filter.chains()
+        self._taps, chains = parallel_filter.chains
         self._taps_state = np.outer(level, steady_state(self._taps, _FIR))
         self._chains = [(chain, _steady_chain(chain, level)) for chain in chains]
 
