@@ -139,6 +139,42 @@ def test_an_axis_with_its_own_core_is_said_to_have_none():
     assert "axes.z" in design.notes[2]
 
 
+def test_an_axis_with_its_own_core_has_the_uncertainty_that_is_stated_of_it():
+    core, own = {"natural_frequency_hz": 200.0, "damping_ratio": 0.3}, \
+        {"natural_frequency_hz": 150.0, "damping_ratio": 0.2}
+    both = model_of(core, {"damping_ratio": 0.02, "axes.z.damping_ratio": 0.05,
+                           "axes.z.natural_frequency_hz": 2.0}, axes={"z": {"core": own}})
+    common = model_of(core, {"damping_ratio": 0.02})
+    alone = model_of(own, {"damping_ratio": 0.05, "natural_frequency_hz": 2.0})
+    values = motion(np.random.default_rng(4), 2000, 200.0)
+    stamps = np.arange(2000) * 500_000
+
+    def variance(model):
+        corrector = Corrector(model, RATE_HZ, noise_std=1e-9, bandwidth_hz=250.0,
+                              max_delay_s=0.01)
+        assert corrector.design.notes == ("",) * 3
+        result = corrector.process(stamps, values)
+        return np.sqrt(result.variance[-1500:]), corrector_variance(model, result.values)
+
+    def corrector_variance(model, corrected):
+        return np.sqrt(corrected_uncertainty(model, corrected, RATE_HZ).variance[-1500:])
+
+    (found, offline), (of_common, _), (of_alone, _) = map(variance, (both, common, alone))
+    np.testing.assert_allclose(found[:, :2], of_common[:, :2], rtol=1e-3)
+    np.testing.assert_allclose(found[:, 2], of_alone[:, 2], atol=0.03 * of_alone[:, 2].max())
+    inner = slice(200, -200)
+    missed = (found - offline)[inner]
+    assert np.sqrt(np.mean(missed**2)) < 0.03 * np.sqrt(np.mean(offline[inner]**2))
+
+
+@pytest.mark.parametrize("name", ["axes.w.damping_ratio", "axes.z", "axes.z.no_such"])
+def test_a_parameter_of_no_axis_is_named(name):
+    design = Corrector(model_of({"natural_frequency_hz": 200.0, "damping_ratio": 0.3},
+                                {name: 0.02}), RATE_HZ).design
+    assert design.parameter_uncertainty == (None,) * 3
+    assert name.removeprefix("axes.z.") in design.notes[2]
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("relative_std", [
     {"natural_frequency_hz": 0.001, "damping_ratio": 0.01, "sensitivity": 0.001},

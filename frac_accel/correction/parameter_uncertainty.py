@@ -223,7 +223,7 @@ def _shortest(problem, delay, frequency, target, changes, unit, noise_gain):
 
 
 def _uncertain_axis(model, name):
-    from ..uncertainty.parameters import UncertainAxis, read_covariance
+    from ..uncertainty.parameters import UncertainAxis, for_axis, read_covariance
     stated = model.metadata.get("covariance")
     if stated is None and (given := model.metadata.get("uncertainties")):
         # standard uncertainties alone: without correlations
@@ -231,17 +231,18 @@ def _uncertain_axis(model, name):
                 isinstance(entry, dict) and "std" in entry for entry in given.values()):
             raise ModelError(f"uncertainties: {given!r:.60} given, expected the std of each "
                              "parameter")
-        std = [number(entry["std"], f"uncertainties.{name}.std")
-               for name, entry in given.items()]
+        std = [number(entry["std"], f"uncertainties.{parameter}.std")
+               for parameter, entry in given.items()]
         stated = {"parameters": list(given), "matrix": [
             [std[i]**2 if i == j else 0.0 for j in range(len(std))] for i in range(len(std))]}
     if stated is None:
         return None
     own = model.axis(name)
-    if own.core != model.core:
+    names, matrix, are_own = for_axis(name, *read_covariance(stated))
+    if own.core != model.core and not are_own:
         raise ModelError(f"axes.{name}: has a core of its own, of which the covariance says "
                          "nothing")
-    return UncertainAxis.given(own, *read_covariance(stated))
+    return UncertainAxis.given(own, names, matrix)
 
 
 def _parts(axis):
