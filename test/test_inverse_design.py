@@ -76,7 +76,7 @@ def check_statements(design):
         assert abs(axis.delay_s - design.delay_samples / rate - own) < 2e-9
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", [*range(20), 40, 62, 175])  # the last cancel by eight digits
 def test_taps_and_chains_are_the_stated_filter(seed):
     """In the time domain, against the sum over the poles in extended precision."""
     model, rate, wishes = random_case(seed)

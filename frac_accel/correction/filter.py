@@ -10,6 +10,8 @@ from ..linear_filter import run_filter, run_sections
 # Samples over which `unknown_history` is looked up once, and how many such at a time.
 _HISTORY_STEP = 8
 _HISTORY_PIECE = 128
+# Error of a filter in series, of its response, from which on it is not used.
+_ROUNDING = 1e-6
 # Poles closer to one than this do not run in series with others.
 _SLOWEST_IN_CHAIN = 3e-7
 # lfilter convolves a pure FIR by another, length-dependent route: a zero keeps it away.
@@ -88,7 +90,8 @@ class ParallelFilter:
         the recursion's matrix with its output fed back,
         :math:`d + \sum_j r_j p_j/(z - p_j) = d \prod_j (z - z_j)/(z - p_j)`, reckoned as
         distances from one, which the slow ones hardly differ from. The slowest poles of all stay
-        beside the product: their rounded coefficients would spoil the whole of it.
+        beside the product: their rounded coefficients would spoil the whole of it. Where residues
+        cancel each other so much that rounding shows, the sections stay beside each other.
 
         Returns
         -------
@@ -96,9 +99,31 @@ class ParallelFilter:
         chains : list of ndarray, shape (m, 6)
             Sections in series, as `run_sections` takes them.
         """
+        taps, chains = self._in_series()
+        share = np.r_[0, np.geomspace(1e-9, 0.5, 300)]
+        z = np.exp(-2j * np.pi * share)
+        found = np.polyval(taps[::-1], z) + sum(np.prod(
+            [np.polyval(section[2::-1], z) / np.polyval(section[:2:-1], z) for section in chain],
+            axis=0) for chain in chains)
+        stated = self.frequency_response(share, 1.0) / z**self.lead
+        size = np.abs(stated)
+        if np.all(np.abs(found - stated) <= _ROUNDING * (size + 1e-3 * size.max())):
+            return taps, chains
+        return np.array(self.taps, float), self._side_by_side()
+
+    def _side_by_side(self):
+        """Chains of one section each, for a real pole or a conjugate pair."""
+        chains = [_real_section(pole.real, residue.real)
+                  for pole, residue in zip(self.poles, self.residues) if not pole.imag]
+        chains += [np.array([[2 * residue.real, -2 * (residue * pole.conj()).real, 0.0,
+                              1.0, -2 * pole.real, abs(pole)**2]])
+                   for pole, residue in zip(self.poles, self.residues) if pole.imag > 0]
+        return chains
+
+    def _in_series(self):
         taps = np.array(self.taps, float)
         alone = (self.poles.imag == 0) & (self.poles.real > 1 - _SLOWEST_IN_CHAIN)
-        chains = [np.array([[residue.real, 0.0, 0.0, 1.0, -pole.real, 0.0]])
+        chains = [_real_section(pole.real, residue.real)
                   for pole, residue in zip(self.poles[alone], self.residues[alone])]
         poles, residues = self.poles[~alone], self.residues[~alone]
         size = np.abs(residues).sum()
@@ -148,6 +173,11 @@ class UnknownHistory:
             self._left = np.concatenate([self._left, weight])
         result, self._left = self._left[:count], self._left[count:]
         return result
+
+
+def _real_section(pole, residue):
+    """Chain of one real pole, whose coefficient is not rounded."""
+    return np.array([[residue, 0.0, 0.0, 1.0, -pole, 0.0]])
 
 
 def _in_twos(distance):
