@@ -53,7 +53,7 @@ _FIELDS: dict[str, dict[str, _Field]] = {
     TEMPERATURE: {"temperature": _Field(0, 1), "variance": _Field(8, 1)},
 }
 _BODY_SIZE = {IMU: 296, ACCEL_STAMPED: 48, TEMPERATURE: 16}
-_DIAGONAL = (0, 4, 8)
+_DIAGONAL = slice(0, 9, 4)
 _LITTLE_ENDIAN_HEADER = b"\x00\x01\x00\x00"
 _FLOAT64 = 8  # sensor_msgs/PointField datatype
 _MAX_RELATIVE_TIME_S = 1e9
@@ -96,6 +96,9 @@ def split_stamps(stamps_ns) -> tuple[np.ndarray, np.ndarray]:
 
 def read_samples(type_name: str, messages: Sequence[bytes]) -> Samples:
     """Samples of serialised messages of one of `ACCELERATION_TYPES`; `BagError` if malformed."""
+    alike = _alike(type_name, messages) if messages and type_name in SAMPLE_TYPES else None
+    if alike:
+        return _samples_of(*alike)
     return read_samples_at(type_name, *_joined(messages))
 
 
@@ -121,11 +124,17 @@ def read_samples_at(
                 for i in range(len(offsets))
             ]
         )
+    return _samples_of(records, frame_id)
+
+
+def _samples_of(records: np.ndarray, frame_id: str) -> Samples:
     values = records["acceleration"].astype(np.float64)
     if "covariance" in records.dtype.names:
-        covariance = records["covariance"].astype(np.float64)
-        variance = covariance[:, _DIAGONAL]
-        variance[(covariance[:, 0] == -1.0) | ~covariance.any(axis=1)] = np.nan
+        covariance = records["covariance"]
+        variance = covariance[:, _DIAGONAL].astype(np.float64)
+        if not variance.min() > 0.0:
+            unknown = (covariance[:, 0] == -1.0) | ~covariance.any(axis=1)
+            variance[unknown] = np.nan
     else:
         variance = np.full(values.shape, np.nan)
     return Samples(_stamps(records), values, variance, frame_id)
@@ -232,10 +241,11 @@ def replace_samples(
 
     It becomes diagonal, or all zeros (unknown) where the variance of an axis is NaN.
     """
-    known = ~np.isnan(variance).any(axis=1, keepdims=True)
-    return _patched(
-        type_name, messages, stamps_ns, values, np.where(known, variance, 0.0), is_whole=True
-    )
+    variance = np.asarray(variance, dtype=np.float64)
+    if variance.size and np.isnan(variance.min()):
+        known = ~np.isnan(variance).any(axis=1, keepdims=True)
+        variance = np.where(known, variance, 0.0)
+    return _patched(type_name, messages, stamps_ns, values, variance, is_whole=True)
 
 
 def _patched(type_name, messages, stamps_ns, values, variance, is_whole) -> list[bytes]:
@@ -243,10 +253,8 @@ def _patched(type_name, messages, stamps_ns, values, variance, is_whole) -> list
         return []
     stamps_ns = np.asarray(stamps_ns, dtype=np.int64)
     values = np.asarray(values, dtype=np.float64)
-    buffer, offsets, lengths = _joined(messages)
-    buffer = bytearray(buffer)
-    records, _ = _records(type_name, buffer, offsets, lengths)
-    if records is None:
+    alike = _alike(type_name, messages)
+    if alike is None:
         variances = [None] * len(messages) if variance is None else np.asarray(variance)
         if is_whole:
             messages = [_without_covariance(type_name, message) for message in messages]
@@ -256,6 +264,7 @@ def _patched(type_name, messages, stamps_ns, values, variance, is_whole) -> list
                 messages, stamps_ns.tolist(), values, variances
             )
         ]
+    records = alike[0]
     records["sec"], records["nanosec"] = split_stamps(stamps_ns)
     records["acceleration"] = values
     if variance is not None and "covariance" in records.dtype.names:
@@ -265,8 +274,7 @@ def _patched(type_name, messages, stamps_ns, values, variance, is_whole) -> list
         else:
             variance = np.where(np.isnan(variance), covariance[:, _DIAGONAL], variance)
         covariance[:, _DIAGONAL] = variance
-    size = int(lengths[0])
-    patched = bytes(buffer)
+    size, patched = len(messages[0]), bytes(records.base)
     return [patched[start : start + size] for start in range(0, len(patched), size)]
 
 
@@ -293,7 +301,7 @@ def patch_sample(
     struct.pack_into(order + "3d", patched, body + fields["acceleration"].offset, *value)
     if variance is not None and "covariance" in fields:
         covariance = body + fields["covariance"].offset
-        for element, element_variance in zip(_DIAGONAL, variance):
+        for element, element_variance in zip(range(9)[_DIAGONAL], variance):
             if element_variance == element_variance:  # not NaN
                 struct.pack_into(order + "d", patched, covariance + 8 * element, element_variance)
     return bytes(patched)
@@ -416,6 +424,43 @@ def _checked_layout(type_name: str, message: bytes) -> tuple[Header, dict[str, _
             f"{type_name} message of {len(message)} bytes is truncated, expected {expected}"
         )
     return header, _FIELDS[type_name]
+
+
+def _alike(type_name: str, messages: Sequence[bytes]) -> tuple[np.ndarray, str] | None:
+    """A writable copy of messages as a structured array, and the first one's frame_id.
+
+    None where they do not all have the first one's layout.
+    """
+    first = messages[0]
+    size = len(first)
+    if size < 16 or set(map(len, messages)) != {size}:
+        return None
+    order = "<" if first[1] else ">"
+    frame_size = struct.unpack_from(order + "I", first, 12)[0]
+    frame = bytes(first[12 : 16 + frame_size])
+    try:
+        layout, frame_id = _known_layout(type_name, bytes(first[:2]), frame, size)
+    except BagError:
+        return None
+    buffer = bytearray().join(messages)
+    records = np.ndarray(len(messages), layout, buffer)
+    if len(messages) > 1 and not (
+        (records["encapsulation"] == first[1]).all()
+        and (records["frame"] == np.frombuffer(frame, np.uint8)).all()
+    ):
+        return None
+    return records, frame_id
+
+
+@functools.lru_cache
+def _known_layout(type_name: str, encapsulation: bytes, frame: bytes, size: int):
+    """Layout of messages that begin so, and their frame_id; `BagError` where they cannot."""
+    start = encapsulation + bytes(10) + frame
+    header, _ = _checked_layout(type_name, start + bytes(size - len(start)))
+    return (
+        _layout(type_name, header.byte_order, len(frame) - 4, header.body_offset, size),
+        header.frame_id,
+    )
 
 
 def _records(

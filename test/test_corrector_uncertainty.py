@@ -68,6 +68,30 @@ def test_it_is_the_propagation_over_the_whole_record(kind, seed):
         assert np.sqrt(np.mean((found - wanted)**2)) < 0.03 * np.sqrt(np.mean(wanted**2))
 
 
+@pytest.mark.parametrize("damping_order", [1.0, 0.6])
+def test_a_slow_sensor_needs_few_taps_for_its_uncertainty(damping_order):
+    """Where the inverse is long, the sensitivity filters need not be, and are as exact."""
+    core = {"natural_frequency_hz": 0.02 * RATE_HZ, "damping_ratio": 0.2,
+            "damping_order": damping_order}
+    std = {"natural_frequency_hz": 0.4, "damping_ratio": 0.01, "sensitivity": 0.002}
+    if damping_order != 1:
+        std["damping_order"] = 0.01
+    model = model_of(core, std)
+    corrector = Corrector(model, RATE_HZ, noise_std=1e-9)
+    inverse, design = corrector.design.axes[0], corrector.design.parameter_uncertainty[0]
+    assert len(inverse.filter.taps) > 150
+    assert max(len(one.taps) for one in design.filters) < 30
+    assert design.worst_error <= 0.02
+    loud = np.sqrt(sum(one.noise_gain**2 for one in design.filters))
+    assert loud <= 0.2 * inverse.noise_gain
+    values = motion(np.random.default_rng(5), 8000, 0.02 * RATE_HZ)
+    result = corrector.process(np.arange(8000) * 500_000, values)
+    expected = corrected_uncertainty(model, result.values, RATE_HZ).variance[2000:-400]
+    found = result.variance[2000:-400]
+    assert np.sqrt(np.mean((np.sqrt(found) - np.sqrt(expected))**2)) \
+        < 0.03 * np.sqrt(np.mean(expected))
+
+
 def test_noise_and_parameters_add_up():
     model = model_of({"natural_frequency_hz": 200.0, "damping_ratio": 0.3}, {"sensitivity": 0.02})
     certain = SensorModel(model.core)
@@ -113,6 +137,42 @@ def test_an_axis_with_its_own_core_is_said_to_have_none():
     design = Corrector(model, RATE_HZ).design
     assert [bool(one) for one in design.parameter_uncertainty] == [True, True, False]
     assert "axes.z" in design.notes[2]
+
+
+def test_an_axis_with_its_own_core_has_the_uncertainty_that_is_stated_of_it():
+    core, own = {"natural_frequency_hz": 200.0, "damping_ratio": 0.3}, \
+        {"natural_frequency_hz": 150.0, "damping_ratio": 0.2}
+    both = model_of(core, {"damping_ratio": 0.02, "axes.z.damping_ratio": 0.05,
+                           "axes.z.natural_frequency_hz": 2.0}, axes={"z": {"core": own}})
+    common = model_of(core, {"damping_ratio": 0.02})
+    alone = model_of(own, {"damping_ratio": 0.05, "natural_frequency_hz": 2.0})
+    values = motion(np.random.default_rng(4), 2000, 200.0)
+    stamps = np.arange(2000) * 500_000
+
+    def variance(model):
+        corrector = Corrector(model, RATE_HZ, noise_std=1e-9, bandwidth_hz=250.0,
+                              max_delay_s=0.01)
+        assert corrector.design.notes == ("",) * 3
+        result = corrector.process(stamps, values)
+        return np.sqrt(result.variance[-1500:]), corrector_variance(model, result.values)
+
+    def corrector_variance(model, corrected):
+        return np.sqrt(corrected_uncertainty(model, corrected, RATE_HZ).variance[-1500:])
+
+    (found, offline), (of_common, _), (of_alone, _) = map(variance, (both, common, alone))
+    np.testing.assert_allclose(found[:, :2], of_common[:, :2], rtol=1e-3)
+    np.testing.assert_allclose(found[:, 2], of_alone[:, 2], atol=0.03 * of_alone[:, 2].max())
+    inner = slice(200, -200)
+    missed = (found - offline)[inner]
+    assert np.sqrt(np.mean(missed**2)) < 0.03 * np.sqrt(np.mean(offline[inner]**2))
+
+
+@pytest.mark.parametrize("name", ["axes.w.damping_ratio", "axes.z", "axes.z.no_such"])
+def test_a_parameter_of_no_axis_is_named(name):
+    design = Corrector(model_of({"natural_frequency_hz": 200.0, "damping_ratio": 0.3},
+                                {name: 0.02}), RATE_HZ).design
+    assert design.parameter_uncertainty == (None,) * 3
+    assert name.removeprefix("axes.z.") in design.notes[2]
 
 
 @pytest.mark.long

@@ -76,6 +76,28 @@ def check_statements(design):
         assert abs(axis.delay_s - design.delay_samples / rate - own) < 2e-9
 
 
+@pytest.mark.parametrize("seed", [*range(20), 40, 62, 175])  # the last cancel by eight digits
+def test_taps_and_chains_are_the_stated_filter(seed):
+    """In the time domain, against the sum over the poles in extended precision."""
+    model, rate, wishes = random_case(seed)
+    try:
+        stated = design_inverse(model, rate, **wishes).axes[0].filter
+    except FracAccelError:
+        return
+    rng = np.random.default_rng(seed)
+    values = 5.0 + 0.1 * np.cumsum(rng.normal(size=3000))
+    delayed = np.r_[np.full(stated.lead, values[0]), values][:len(values)].astype(np.longdouble)
+    expected = np.convolve(np.r_[np.full(len(stated.taps) - 1, values[0]), delayed],
+                           stated.taps.astype(np.longdouble), "valid")
+    for pole, residue in zip(stated.poles.astype(np.clongdouble), stated.residues):
+        output, part = delayed[0] / (1 - pole), np.empty(len(values), np.clongdouble)
+        for i, value in enumerate(delayed):
+            output = part[i] = pole * output + value
+        expected += (residue * part).real
+    error = run(stated, values, values[0]) - expected.astype(float)
+    assert np.max(np.abs(error)) < 1e-5 * np.max(np.abs(expected))
+
+
 @pytest.mark.parametrize("seed", range(40))
 def test_random_models_true_statements_or_a_refusal_that_helps(seed):
     model, rate, wishes = random_case(seed)

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.ros
 
 RATE_HZ = 2000.0
 # As docs/nodes.md states them.
-RESTART_S, RATE_CHANGE_S = 5.0, 8.0
+RESTART_S, RATE_CHANGE_S, REFERENCE_S = 5.0, 8.0, 4.0
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +73,12 @@ def running(model_file, **parameters):
         yield probe, node, environment
 
 
+def counters_of(node):
+    """What the node says at its end that it has done."""
+    return {name: int(number) for name, number in
+            (item.split() for item in node.output[-1].split(": ")[1].split(", "))}
+
+
 def test_every_fault_of_the_stream_is_counted_and_passes(record, model_file):
     """Silence, old stamps, NaN, clocks set forward and back, a publisher that is restarted."""
     nan = samples_of(record, 4000, 30)
@@ -110,8 +116,7 @@ def test_every_fault_of_the_stream_is_counted_and_passes(record, model_file):
     np.testing.assert_array_equal(live.values, np.concatenate([p.values for p in expected]))
     np.testing.assert_array_equal(live.variance, np.concatenate([p.variance for p in expected]))
     assert all(offline.design.parameter_uncertainty)
-    counters = {name: int(number) for name, number in
-                (item.split() for item in node.output[-1].split(": ")[1].split(", "))}
+    counters = counters_of(node)
     assert counters.pop("published") == count
     counters.pop("late", None)
     assert counters == {name: number for name, number in offline.counters.items() if number}
@@ -154,8 +159,7 @@ def test_an_estimated_rate_is_followed_when_the_sensor_changes_it(record, model_
             assert time.monotonic() - changed_s < RATE_CHANGE_S
         time.sleep(0.5)
         assert node.stop() == 0
-    counters = {name: int(number) for name, number in
-                (item.split() for item in node.output[-1].split(": ")[1].split(", "))}
+    counters = counters_of(node)
     assert counters["samples"] == 12_000
     assert counters["samples"] == sum(counters.get(name, 0) for name in (
         "given", "waiting", "warm_up", "cut_off", "duplicates", "stamps_back", "early",
@@ -207,6 +211,81 @@ def test_a_reference_that_stops_is_missed_and_taken_up_again(record, model_file)
         publish([(second, raw[2000:6000])], 1000.0)
         probe.status("the reference is lost", ever=True)
         probe.figures[name].clear()
-        publish([(first, reference[6000:10_000]), (second, raw[6000:10_000])], 1000.0)
-        probe.until(lambda: probe.figures[name], "no error after the reference was back")
+        returned_s = time.monotonic()
+        with background(publish, [(first, reference[6000:10_000]), (second, raw[6000:10_000])],
+                        1000.0):
+            probe.until(lambda: probe.figures[name], "no error after the reference was back")
+            assert time.monotonic() - returned_s < REFERENCE_S
     assert np.median(probe.figures[name]) < 0.02
+
+
+def test_a_rate_other_than_the_stated_one_is_said_and_bridged(record, model_file):
+    fast = samples_of(record, 0, 1000)
+    wave = np.sin(2 * np.pi * 50e-3 * np.arange(4000))
+    slow = Samples.of(fast.stamps_ns[-1] + 1_000_000 * np.arange(1, 4001),
+                      np.stack([wave] * 3, axis=1), np.full((4000, 3), 1e-4))
+    offline = Corrector(SensorModel.load(model_file), RATE_HZ)
+    expected = [offline.process(*samples[:3]) for samples in (fast, slow)]
+    with running(model_file, sample_rate_hz=RATE_HZ) as (probe, node, _):
+        received = probe.collect(Imu, "/imu/data")
+        publisher = probe.publisher(Imu, "/imu/data_raw")
+        publish([(publisher, encoded(fast))], RATE_HZ)
+        with background(publish, [(publisher, encoded(slow))], 1000.0):
+            probe.status("sample_rate_hz is 2000")
+        probe.until(lambda: len(received) == sum(map(len, expected)), "not all came")
+        assert node.stop() == 0
+    counters = counters_of(node)
+    assert counters["gaps"] == offline.counters["gaps"] > 3900
+    np.testing.assert_array_equal(cdr.read_samples(cdr.IMU, received).values,
+                                  np.concatenate([part.values for part in expected]))
+
+
+def test_overload_is_counted_message_by_message(record, model_file):
+    """The node stands still for a second, with a queue for a tenth of that."""
+    sent = samples_of(record, 0, 9000)
+    with running(model_file, sample_rate_hz=RATE_HZ, depth=200) as (probe, node, _):
+        received = probe.collect(Imu, "/imu/data")
+        publisher = probe.publisher(Imu, "/imu/data_raw")
+        with background(publish, [(publisher, encoded(sent))], RATE_HZ):
+            probe.until(lambda: len(received) > 2000, "nothing corrected")
+            node.process.send_signal(signal.SIGSTOP)
+            time.sleep(1.0)
+            node.process.send_signal(signal.SIGCONT)
+            status = probe.status("lost")
+        last_ns = sent.stamps_ns[-1] - 10_000_000
+        probe.until(lambda: cdr.read_header(received[-1]).stamp_ns > last_ns, "no end")
+        time.sleep(0.3)
+        assert node.stop() == 0
+    counters = counters_of(node)
+    assert counters["lost"] > 500, status.message
+    assert counters["samples"] + counters["lost"] == 9000
+    assert counters["published"] == counters["given"] == len(received)
+    # valid again: the last second is that of a stream without a fault
+    last = cdr.read_samples(cdr.IMU, received[-1000:])
+    whole = Corrector(SensorModel.load(model_file), RATE_HZ).process(*sent[:3])
+    np.testing.assert_array_equal(last.stamps_ns, whole.stamps_ns[-1000:])
+    error = np.abs(last.values - whole.values[-1000:])
+    assert (error < 4 * np.sqrt(last.variance)).all()
+
+
+def test_what_waits_for_its_filter_is_late_and_not_lost(record, model_file, tmp_path):
+    """A design with hundreds of draws of the parameters, at a rate that had to be estimated."""
+    document = yaml.safe_load(model_file.read_text())
+    std = 0.08 * document["core"]["natural_frequency_hz"]
+    document["covariance"] = {"parameters": ["natural_frequency_hz"], "matrix": [[std**2]]}
+    slow_file = tmp_path / "slow.yaml"
+    slow_file.write_text(yaml.safe_dump(document))
+    samples = samples_of(record, 0, 3000)
+    offline = Corrector(SensorModel.load(slow_file))
+    expected = offline.process(*samples[:3])
+    assert offline.design.parameter_uncertainty[0].method == "Monte Carlo"
+    with running(slow_file) as (probe, node, _):
+        received = probe.collect(Imu, "/imu/data")
+        publisher = probe.publisher(Imu, "/imu/data_raw")
+        publish([(publisher, encoded(samples))], RATE_HZ)
+        probe.until(lambda: len(received) == len(expected), lambda: f"{len(received)} received")
+        assert node.stop() == 0
+    counters = counters_of(node)
+    assert 0 < counters["late"] < 3000
+    assert "lost" not in counters
+    np.testing.assert_array_equal(cdr.read_samples(cdr.IMU, received).values, expected.values)

@@ -153,6 +153,15 @@ def test_launch_file_uses_each_argument_that_it_declares(name):
     assert executables and executables <= set(NODES)
 
 
+def test_on_a_vehicle_a_corrector_that_has_died_is_started_again():
+    tree = ast.parse((ROOT / "launch" / "vehicle.launch.py").read_text())
+    given, = ({keyword.arg: keyword.value for keyword in call.keywords} for call in ast.walk(tree)
+              if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "Node")
+    assert ast.literal_eval(given["executable"]) == "corrector"
+    assert ast.literal_eval(given["respawn"]) is True
+    assert ast.literal_eval(given["respawn_delay"]) <= 2.0
+
+
 @pytest.mark.parametrize("name", ["bench.launch.py", "vehicle.launch.py"])
 def test_launch_file_is_a_description(name):
     pytest.importorskip("launch_ros", reason="launch comes with an installed ROS only")

@@ -56,9 +56,12 @@ class Passage:
     latencies_ms: np.ndarray
 
 
-def model_document(rate_hz):
-    """A sensor whose inverse has a long fractional memory, with uncertain parameters."""
-    core = {"natural_frequency_hz": 0.15 * rate_hz, "damping_ratio": 0.2, "damping_order": 0.6,
+def model_document(rate_hz, share=0.15):
+    """A sensor whose inverse has a long fractional memory, with uncertain parameters.
+
+    Its natural frequency is a share of the sampling rate.
+    """
+    core = {"natural_frequency_hz": share * rate_hz, "damping_ratio": 0.2, "damping_order": 0.6,
             "sensitivity": 1.0}
     std = {"natural_frequency_hz": 0.01, "damping_ratio": 0.05, "damping_order": 0.02,
            "sensitivity": 0.002}
@@ -281,8 +284,9 @@ def _figures(passages, starts):
     figures += [
         Figure("live", "10 000 Imu/s: processor time over the cheaper raw relay's",
                ratio(fast, *relays), "", most=1.5, peer=f"{PEERS['raw']}; {PEERS['raw_drained']}"),
-        Figure("live", "typed relay's processor time over ours at 10 000/s",
-               1 / ratio(fast, *typed), "", least=8, peer=PEERS["typed"]),
+        *(Figure("live", f"typed relay's processor time at {rate_hz:.0f}/s over ours at 10000/s",
+                 1 / ratio(fast, ("typed", rate_hz)), "", least=8, peer=PEERS["typed"])
+          for _, rate_hz in typed),
         Figure("live", "filtering typed node's processor time over ours at 10 000/s",
                1 / ratio(fast, ("typed_filter", 1000.0), ("typed_filter", 10_000.0)), "",
                peer=PEERS["typed_filter"]),

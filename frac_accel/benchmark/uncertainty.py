@@ -85,20 +85,21 @@ def run(rounds):
 def _sensitivity_filters(rounds):
     """Time that the parameters' uncertainty adds to the correction, per sample and axis."""
     rate_hz = 10_000.0
-    corrector = Corrector(SensorModel.from_dict(model_document(rate_hz)), rate_hz, noise_std=0.01)
-    design = corrector.design.parameter_uncertainty[0]
     values = np.random.default_rng(0).normal(size=(3, 4096))
     figures = []
-    for block in (4096, 32):
-        def one(block=block):
+    for share, block in ((0.15, 4096), (0.15, 32), (0.02, 4096)):
+        model = SensorModel.from_dict(model_document(rate_hz, share))
+        design = Corrector(model, rate_hz, noise_std=0.01).design
+
+        def one(design=design.parameter_uncertainty[0], block=block):
             state = ParameterUncertaintyState(design, np.zeros(3))
             for start in range(0, 4096, block):
                 state.process(values[:, start:start + block])
 
         figures.append(Figure(
-            "uncertainty", f"fractional inverse, 4 uncertain parameters, blocks of {block}: "
-            "time per sample and axis", shortest_us(one, 3 * 4096, 5 * rounds), "us",
-            most=0.2 if block > 1000 else None))
+            "uncertainty", f"fractional inverse of {len(design.axes[0].filter.taps)} taps, 4 "
+            f"uncertain parameters, blocks of {block}: time per sample and axis",
+            shortest_us(one, 3 * 4096, 5 * rounds), "us", most=0.2 if block > 1000 else None))
     return figures
 
 

@@ -34,18 +34,20 @@ class Corrector(Stream):
     def _design(self, model, sample_rate_hz, **wishes):
         return design_inverse(model, sample_rate_hz, **wishes)
 
+    def _adopt(self, model):
+        super()._adopt(model)
+        self._clips = bool(np.isfinite(model.limits).any())
+        self._has_effects = any(axis.effects for axis in model.axes)
+        self._needs_temperature = model.needs_temperature
+
     def _count(self, values):
         found = {}
         if self._clips:
             found["clipped"] = int(self._is_clipped(values).any(axis=1).sum())
-        if self._model.needs_temperature and not self._temperature.is_known:
+        if self._needs_temperature and not self._temperature.is_known:
             found["without_temperature"] = len(values)
         for name, count in found.items():
             self._totals[name] = self._totals.get(name, 0) + count
-
-    @property
-    def _clips(self):
-        return bool(np.isfinite(self._model.limits).any())
 
     def _begin(self):
         super()._begin()
@@ -57,7 +59,10 @@ class Corrector(Stream):
             # of a clipped sample no more is known than that it is beyond the limit
             low, high = self._model.limits
             variance = np.where(self._is_clipped(values), ((high - low) / 2)**2, variance)
-        return self._inverse(values, variance, self._circumstances(index, stamps_ns))
+        if self._has_effects:
+            values, variance = self._inverse(values, variance,
+                                             self._circumstances(index, stamps_ns))
+        return values, variance
 
     def _stamps(self, stamps_ns):
         """Instants that the samples with these stamps show."""

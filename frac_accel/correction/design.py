@@ -174,13 +174,19 @@ def _parameter_uncertainty(model, problems, delay, axes):
     """`ParameterUncertainty` of each axis, or None and why there is none."""
     known = {}
     for name, problem, linear in zip(AXES, problems, axes):
-        if (problem, model.axis(name)) not in known:
+        # axes alike share the filters, unless the file says something of one alone
+        alike = problem, model.axis(name), name if _says_of_axes(model) else ""
+        if alike not in known:
             try:
                 result = design_parameter_uncertainty(model, name, problem, delay, linear), ""
             except ModelError as error:
                 result = None, str(error)
-            known[problem, model.axis(name)] = result
-        yield known[problem, model.axis(name)]
+            known[alike] = result
+        yield known[alike]
+
+
+def _says_of_axes(model):
+    return any("axes." in str(model.metadata.get(key)) for key in ("covariance", "uncertainties"))
 
 
 def _delay_with_terms(delay, nonlinear, rate, max_delay_s):

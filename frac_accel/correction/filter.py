@@ -1,13 +1,21 @@
 """Stable, causal filter of the correction: taps and a bank of recursive sections in parallel."""
 
 import dataclasses
+import functools
 
 import numpy as np
 
-from ..linear_filter import run_filter
+from ..linear_filter import run_filter, run_sections
 
-# Samples over which `unknown_history` is looked up once.
+# Samples over which `unknown_history` is looked up once, and how many such at a time.
 _HISTORY_STEP = 8
+_HISTORY_PIECE = 128
+# Error of a filter in series, of its response, from which on it is not used.
+_ROUNDING = 1e-6
+# Poles closer to one than this do not run in series with others.
+_SLOWEST_IN_CHAIN = 3e-7
+# lfilter convolves a pure FIR by another, length-dependent route: a zero keeps it away.
+_FIR = np.array([1.0, 0.0])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -73,28 +81,119 @@ class ParallelFilter:
         decay = np.abs(self.poles) ** (np.asarray(count) - self.lead)[..., None]
         return (np.abs(self.residues) / np.abs(1 - self.poles) * decay).sum(axis=-1)
 
-    def unknown_history_after(self, first, start, count):
-        """`unknown_history` at `count` samples from `start` on, held over a few at a time.
+    @functools.cached_property
+    def chains(self):
+        r"""The same filter as taps beside chains of second-order sections, which run much faster.
 
-        Where it is looked up depends on `first`, at most `start`, only: not on how the samples are
-        split into blocks.
+        With a constant :math:`d = \sum_j |r_j|` added, the recursive part has zeros that lie beside
+        its poles and is a product; the taps take the constant back. The zeros are eigenvalues of
+        the recursion's matrix with its output fed back,
+        :math:`d + \sum_j r_j p_j/(z - p_j) = d \prod_j (z - z_j)/(z - p_j)`, reckoned as
+        distances from one, which the slow ones hardly differ from. The slowest poles of all stay
+        beside the product: their rounded coefficients would spoil the whole of it. Where residues
+        cancel each other so much that rounding shows, the sections stay beside each other.
+
+        Returns
+        -------
+        taps : ndarray, shape (n_taps,)
+        chains : list of ndarray, shape (m, 6)
+            Sections in series, as `run_sections` takes them.
         """
-        place = np.arange(start - first, start - first + count) // _HISTORY_STEP
-        looked_up = self.unknown_history(first + _HISTORY_STEP * np.arange(place[0], place[-1] + 1))
-        return looked_up[place - place[0]]
+        taps, chains = self._in_series()
+        share = np.r_[0, np.geomspace(1e-9, 0.5, 300)]
+        z = np.exp(-2j * np.pi * share)
+        found = np.polyval(taps[::-1], z) + sum(np.prod(
+            [np.polyval(section[2::-1], z) / np.polyval(section[:2:-1], z) for section in chain],
+            axis=0) for chain in chains)
+        stated = self.frequency_response(share, 1.0) / z**self.lead
+        size = np.abs(stated)
+        if np.all(np.abs(found - stated) <= _ROUNDING * (size + 1e-3 * size.max())):
+            return taps, chains
+        return np.array(self.taps, float), self._side_by_side()
 
-    def sections(self):
-        """Numerators and denominators of the recursive sections, two poles in each."""
-        pairs = []
-        for i in range(0, len(self.poles), 2):
-            poles, residues = self.poles[i:i + 2], self.residues[i:i + 2]
-            if len(poles) == 2:
-                numerator = [residues.sum(), -(residues * poles[::-1]).sum()]
-                denominator = [1.0, -poles.sum(), poles.prod()]
-            else:
-                numerator, denominator = [residues[0]], [1.0, -poles[0]]
-            pairs.append((np.real(numerator), np.real(denominator)))
-        return pairs
+    def _side_by_side(self):
+        """Chains of one section each, for a real pole or a conjugate pair."""
+        chains = [_real_section(pole.real, residue.real)
+                  for pole, residue in zip(self.poles, self.residues) if not pole.imag]
+        chains += [np.array([[2 * residue.real, -2 * (residue * pole.conj()).real, 0.0,
+                              1.0, -2 * pole.real, abs(pole)**2]])
+                   for pole, residue in zip(self.poles, self.residues) if pole.imag > 0]
+        return chains
+
+    def _in_series(self):
+        taps = np.array(self.taps, float)
+        alone = (self.poles.imag == 0) & (self.poles.real > 1 - _SLOWEST_IN_CHAIN)
+        chains = [_real_section(pole.real, residue.real)
+                  for pole, residue in zip(self.poles[alone], self.residues[alone])]
+        poles, residues = self.poles[~alone], self.residues[~alone]
+        size = np.abs(residues).sum()
+        if not size:
+            return taps, chains
+        taps[0] += residues.sum().real - size
+        count, distance, weight = len(poles), 1 - poles, residues * poles / size
+        matrix, feed, out = np.zeros((count, count)), np.zeros(count), np.zeros(count)
+        for i, pole in enumerate(poles):
+            if not pole.imag:
+                matrix[i, i], feed[i], out[i] = distance[i].real, 1.0, weight[i].real
+            elif pole.imag > 0:
+                # rotation by the pair, whose second pole follows
+                matrix[i:i + 2, i:i + 2] = [[distance[i].real, -pole.imag],
+                                            [pole.imag, distance[i].real]]
+                feed[i], out[i:i + 2] = 1.0, (2 * weight[i].real, 2 * weight[i].imag)
+        zeros = np.linalg.eigvals(matrix + np.outer(feed, out))
+        chain = np.array([[*over, *under]
+                          for over, under in zip(_in_twos(zeros), _in_twos(distance))])
+        chain[0, :3] *= size
+        return taps, [chain, *chains]
+
+
+class UnknownHistory:
+    """Square of `ParallelFilter.unknown_history` from sample to sample.
+
+    It is looked up every few samples, in pieces that do not depend on how the samples are split.
+
+    Parameters
+    ----------
+    parallel_filter : ParallelFilter
+    first : int
+        Samples since the start, at the first that is asked for.
+    """
+
+    def __init__(self, parallel_filter, first):
+        self._filter = parallel_filter
+        self._next = first
+        self._left = np.empty(0)
+
+    def squared(self, count):
+        """At the next `count` samples."""
+        while len(self._left) < count:
+            at = self._next + _HISTORY_STEP * np.arange(_HISTORY_PIECE)
+            self._next += _HISTORY_STEP * _HISTORY_PIECE
+            weight = np.repeat(self._filter.unknown_history(at)**2, _HISTORY_STEP)
+            self._left = np.concatenate([self._left, weight])
+        result, self._left = self._left[:count], self._left[count:]
+        return result
+
+
+def _real_section(pole, residue):
+    """Chain of one real pole, whose coefficient is not rounded."""
+    return np.array([[residue, 0.0, 0.0, 1.0, -pole, 0.0]])
+
+
+def _in_twos(distance):
+    """Polynomials of the second degree in the delay, of roots so far from one.
+
+    The conjugate pairs first, then the slowest with the fastest: of two slow ones, rounding would
+    spoil the value at the delay one.
+    """
+    pairs = distance[distance.imag > 0]
+    real = np.sort(distance[distance.imag == 0].real)
+    slow, fast = real[:(len(real) + 1) // 2], real[::-1][:len(real) // 2]
+    result = [[1.0, 2 * one.real - 2, abs(1 - one)**2] for one in pairs[np.argsort(abs(pairs))]]
+    result += [[1.0, one + other - 2, (1 - one) * (1 - other)] for one, other in zip(slow, fast)]
+    if len(slow) > len(fast):
+        result.append([1.0, slow[-1] - 1, 0.0])
+    return result
 
 
 class FilterState:
@@ -111,11 +210,10 @@ class FilterState:
     """
 
     def __init__(self, parallel_filter, level):
-        # lfilter convolves a pure FIR by another, length-dependent route: a zero keeps it away
-        links = [(np.asarray(parallel_filter.taps, float), np.array([1.0, 0.0]))]
-        links += parallel_filter.sections()
-        self._links = [(b, a, np.outer(level, steady_state(b, a))) for b, a in links]
         self._waiting = np.repeat(level[:, None], parallel_filter.lead, axis=1)
+        self._taps, chains = parallel_filter.chains
+        self._taps_state = np.outer(level, steady_state(self._taps, _FIR))
+        self._chains = [(chain, _steady_chain(chain, level)) for chain in chains]
 
     def process(self, values):
         """Outputs for the next inputs; shape (k, n) in and out."""
@@ -123,12 +221,20 @@ class FilterState:
             queue = np.concatenate([self._waiting, values], axis=1)
             count = values.shape[1]
             values, self._waiting = queue[:, :count], queue[:, count:]
-        total = None
-        for i, (b, a, state) in enumerate(self._links):
-            output, state = run_filter(b, a, values, state)
-            self._links[i] = (b, a, state)
-            total = output if total is None else total + output
-        return total
+        output, self._taps_state = run_filter(self._taps, _FIR, values, self._taps_state)
+        for chain, state in self._chains:
+            output += run_sections(chain, values, state)
+        return output
+
+
+def _steady_chain(chain, level):
+    """State of `run_sections` after inputs of these levels for ever."""
+    state = np.empty((len(level), len(chain), 2))
+    for i, section in enumerate(chain):
+        b, a = section[:3], section[3:]
+        state[:, i] = np.outer(level, steady_state(b, a))
+        level = level * (b.sum() / a.sum())
+    return state
 
 
 def steady_state(b, a):

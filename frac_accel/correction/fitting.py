@@ -151,7 +151,7 @@ class FilterProblem:
                     quiet, best, response = middle, unknowns, trial
                 else:
                     loud = middle
-        result = self._filter(best, taps, poles)
+        result = self.filter_of(best, taps, poles)
         phase = np.angle(response)
         return DesignedFilter(
             filter=result, sampling_rate_hz=self.rate, band_hz=self.band,
@@ -164,11 +164,15 @@ class FilterProblem:
         """What errors are relative to: the target, made no smaller than the floor."""
         return target * np.maximum(1.0, self.floor / np.abs(target))
 
-    def structure(self, delay):
-        """Basis of the taps for a delay [samples] up to `longest`, and the poles in z."""
+    def structure(self, delay, tail=TAIL):
+        """Basis of the taps for a delay [samples] up to `longest`, and the poles in z.
+
+        The taps after the delay are at least as many as those before, or `tail` periods of the
+        highest frequency.
+        """
         low, high = self.band
         before = np.ceil(delay + self.extra_delay)
-        count = int(before + max(before, np.ceil(TAIL * self.rate / high))) + 2
+        count = int(before + max(before, np.ceil(tail * self.rate / high))) + 2
         step = max(1, int(self.rate / (8 * high)))
         taps = _SmoothTaps.of_length(max(count, 4), step)
         # decays that the taps alone would cut off too early
@@ -222,7 +226,8 @@ class FilterProblem:
                 columns.append(np.stack([section, section * z], axis=1))
         return np.concatenate(columns, axis=1)
 
-    def _filter(self, unknowns, taps, poles):
+    def filter_of(self, unknowns, taps, poles):
+        """ParallelFilter of the unknowns that belong to `columns`."""
         rest = iter(unknowns[taps.unknowns:])
         residues = []
         for pole in poles:

@@ -7,7 +7,9 @@ the parameters, and the mean of such a quadratic form is a sum of squares,
 
 .. math:: u^2 = \sum_k (F_k * y + c_k)^2 ,
 
-of a few filters that run on the raw samples beside the inverse. To first order,
+of a few filters that run on the raw samples beside the inverse. A nonlinear spring's part of the
+inverse is linear in its coefficients, so that each of these has a signal of its own, which joins
+the sum with what the parameters move it by. To first order,
 :math:`\Delta_\delta = -\sum_i \delta_i \, \partial \ln H / \partial \theta_i`, and the F_k belong
 to the roots of the covariance (A. Link, C. Elster, *Meas. Sci. Technol.* 20 (2009) 055104, have the
 same for the coefficients of a digital filter). Where the inverse does not depend linearly on the
@@ -15,13 +17,15 @@ parameters, they belong to draws of these instead. The c_k are those of an uncer
 """
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import ModelError
-from ..linear_filter import run_filter
 from ..parameters import number
-from .filter import steady_state
+from .filter import FilterState
+from .fitting import TAIL
+from .static_terms import coefficients
 
 # Of the standard uncertainty at each frequency: permitted error of the filters, and what may be
 # left out of them.
@@ -29,10 +33,18 @@ _TOLERANCE = 0.02
 _NEGLECTED = 0.01
 # Below this share of its largest value over the band, the uncertainty is not fitted.
 _FLOOR = 0.03
+# Lengths that are tried, over that of the inverse, and the most noise that a shorter one may let
+# through, over that of the inverse: in the variance, 4 %.
+_LENGTHS = (0.06, 0.09, 0.12, 0.18, 0.25, 0.5, 1)
+_NOISE_SHARE = 0.2
 _NOISE_WEIGHTS = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-5)
 # Of the poles that carry the inverse's long memory, the sensitivities need every third.
 _THINNED = 2
 _DRAWS = 400
+# Relative change of a response that is none.
+_ROUNDING = 1e-9
+# Step of a central difference, of the parameter.
+_STEP = 1e-5
 _MOST_FREQUENCIES = 2000
 
 
@@ -42,14 +54,14 @@ class ParameterUncertainty:
 
     Attributes
     ----------
-    taps : ndarray, shape (k, n_taps)
-        Of each filter.
-    sections : tuple of (ndarray, ndarray)
-        Numerators and denominators of recursive sections, which all filters share.
-    mix : ndarray, shape (k, n_sections)
-        What each filter takes of each section.
-    constants : ndarray, shape (k,)
-        c_k, of the offset.
+    filters : tuple of ParallelFilter
+        F_k.
+    constants : ndarray, shape (m,)
+        c_k, of the offset; those beyond the number of filters stand without one.
+    parts : tuple
+        Of the nonlinear spring's terms; see `StaticTermsState`.
+    shares : ndarray, shape (m, n_parts)
+        What each square takes of these.
     constant_variance : float
         Of what the offset adds beside the filters.
     lead : int
@@ -61,13 +73,13 @@ class ParameterUncertainty:
     worst_error : float
         Of the filters in the band, over the standard uncertainty at each frequency.
     left_out : tuple of str
-        Parameters in the covariance that the linear response does not depend on.
+        Parameters in the covariance that are not in the variance.
     """
 
-    taps: np.ndarray
-    sections: tuple
-    mix: np.ndarray
+    filters: tuple
     constants: np.ndarray
+    parts: tuple
+    shares: np.ndarray
     constant_variance: float
     lead: int
     method: str
@@ -78,7 +90,7 @@ class ParameterUncertainty:
     def summary(self):
         """Plain values, for reports and diagnostics."""
         return {"method": self.method, "nonlinearity": self.nonlinearity,
-                "worst_error": self.worst_error, "filters": len(self.taps),
+                "worst_error": self.worst_error, "filters": len(self.filters),
                 "left_out": list(self.left_out)}
 
 
@@ -93,36 +105,34 @@ class ParameterUncertaintyState:
     """
 
     def __init__(self, design, level):
-        self._design = design
-        links = [(taps, np.array([1.0, 0.0])) for taps in design.taps] + list(design.sections)
-        self._links = [(b, a, np.outer(level, steady_state(b, a))) for b, a in links]
+        self._states = [FilterState(one, level) for one in design.filters]
+        self._states += [None] * (len(design.constants) - len(self._states))
+        self._added = list(zip(design.constants.tolist(), design.shares.tolist()))
+        self._constant_variance = design.constant_variance
         self._waiting = np.repeat(level[:, None], design.lead, axis=1)
-        self._shares = design.mix.T[:, :, None, None].copy()
-        self._constants = design.constants[:, None, None]
 
-    def process(self, values):
-        """Variance that belongs to the next samples; shape (k, n) in and out."""
-        design = self._design
-        if design.lead:
+    def process(self, values, parts=()):
+        """Variance that belongs to the next samples; shape (k, n) in and out.
+
+        Parameters
+        ----------
+        values : ndarray, shape (k, n)
+        parts : list of ndarray, shape (k, n)
+            What the parts of the spring add to the corrected samples.
+        """
+        shape = values.shape
+        if self._waiting.shape[1]:
             queue = np.concatenate([self._waiting, values], axis=1)
-            values, self._waiting = np.split(queue, [values.shape[1]], axis=1)
-        outputs = []
-        for i, (b, a, state) in enumerate(self._links):
-            output, state = run_filter(b, a, values, state)
-            self._links[i] = (b, a, state)
-            outputs.append(output)
-        count = len(design.taps)
-        if not count:
-            return np.full(values.shape, design.constant_variance)
-        sums = np.stack(outputs[:count])
-        for shares, output in zip(self._shares, outputs[count:]):
-            sums += shares * output
-        sums += self._constants
-        sums *= sums
-        total = sums[0]
-        for square in sums[1:]:
-            total += square
-        total += design.constant_variance
+            values, self._waiting = queue[:, :shape[1]], queue[:, shape[1]:]
+        total = np.full(shape, self._constant_variance)
+        for state, (constant, shares) in zip(self._states, self._added):
+            output = state.process(values) if state else np.zeros(shape)
+            if constant:
+                output += constant
+            for share, part in zip(shares, parts):
+                output += share * part
+            output *= output
+            total += output
         return total
 
 
@@ -158,45 +168,62 @@ def design_parameter_uncertainty(model, name, problem, delay, linear):
     step = -(-len(problem.check) // _MOST_FREQUENCIES)
     frequency, target = problem.check[::step], problem.check_target[::step]
     s = 2j * np.pi * np.maximum(frequency, 1e-9 * problem.rate)
-    changes, constants, method, nonlinearity = _changes(uncertain, s, offset_gain)
-    moved = np.abs(uncertain.slopes(s[:: max(1, len(s) // 50)])).max(axis=1) > 0
+    parts = _parts(uncertain.axis)
+    changes, constants, shares, method, nonlinearity = _changes(uncertain, s, offset_gain, parts)
+    slopes = np.abs(uncertain.slopes(s[:: max(1, len(s) // 50)])).max(axis=1)
+    moved = slopes * np.where(uncertain.values, np.abs(uncertain.values), 1.0) > _ROUNDING
+    moved |= np.any(_part_slopes(uncertain, parts), axis=0)
     left_out = tuple(parameter for parameter, is_moved in zip(uncertain.names, moved)
                      if not is_moved and parameter != "offset")
     relative = np.sqrt(np.sum(np.abs(changes)**2, axis=0))
     if not np.isfinite(relative).all():
         raise ModelError("covariance: it cannot be propagated, the response changes without bound")
-    if not relative.any():
-        return ParameterUncertainty(
-            np.empty((0, 1)), (), np.empty((0, 0)), np.empty(0), float(np.sum(constants**2)), 0,
-            method, nonlinearity, 0.0, left_out)
+    if relative.max() < _ROUNDING:
+        constants, shares, rest = _without_filters(constants, shares)
+        return ParameterUncertainty((), constants, parts, shares, rest, 0, method, nonlinearity,
+                                    0.0, left_out)
     unit = np.maximum(relative, _FLOOR * relative.max())
-    changes, constants, rest = _principal(changes, constants, unit)
-    wait = max(0, delay - problem.longest)
-    taps, poles = problem.structure(delay - wait)
-    poles = _thinned(poles)
-    phase = np.exp(2j * np.pi * frequency * (delay - wait + problem.extra_delay) / problem.rate)
-    scale = phase / (target * unit)
-    columns = problem.columns(frequency, taps, poles) * scale[:, None]
-    outside = problem.columns(problem.outside, taps, poles) \
-        * (problem.outside_weight / relative.max())[:, None]
-    unknowns, error = _fitted(columns, changes / unit, outside)
-    sections = []
-    for pole in poles:
-        if not pole.imag:
-            sections.append((np.array([(1 - pole).real, 0.0]), np.array([1.0, -pole.real])))
-        elif pole.imag > 0:
-            size, denominator = abs(1 - pole)**2, np.array([1.0, -2 * pole.real, abs(pole)**2])
-            sections += [(np.array([size, 0.0, 0.0]), denominator),
-                         (np.array([0.0, size, 0.0]), denominator)]
+    changes, constants, shares, rest = _principal(changes, constants, shares, unit)
+    fit = _shortest(problem, delay, frequency, target, changes, unit, linear.noise_gain)
     return ParameterUncertainty(
-        taps=np.array([taps.taps(column[:taps.unknowns]) for column in unknowns.T]),
-        sections=tuple(sections), mix=unknowns[taps.unknowns:].T.copy(), constants=constants,
-        constant_variance=rest, lead=problem.lead + wait, method=method, nonlinearity=nonlinearity,
-        worst_error=error, left_out=left_out)
+        filters=fit.filters, constants=constants, parts=parts, shares=shares,
+        constant_variance=rest, lead=fit.lead, method=method, nonlinearity=nonlinearity,
+        worst_error=fit.error, left_out=left_out)
+
+
+class _Fit(NamedTuple):
+    filters: tuple
+    lead: int
+    error: float
+
+
+def _shortest(problem, delay, frequency, target, changes, unit, noise_gain):
+    """Shortest filters that are as exact as the inverse's own length allows or as wanted.
+
+    Noise of the samples passes them, too; what it adds to the variance stays a small share of what
+    it makes through the inverse.
+    """
+    own = min(delay, problem.longest)
+    for share in _LENGTHS:
+        short = int(np.ceil(share * own))
+        wait = delay - short
+        taps, poles = problem.structure(short, share * TAIL)
+        poles = _thinned(poles)
+        phase = np.exp(2j * np.pi * frequency * (short + problem.extra_delay) / problem.rate)
+        columns = problem.columns(frequency, taps, poles) * (phase / (target * unit))[:, None]
+        outside = problem.columns(problem.outside, taps, poles) \
+            * (problem.outside_weight / unit.max())[:, None]
+        unknowns, error = _fitted(columns, changes / unit, outside)
+        filters = tuple(dataclasses.replace(problem.filter_of(column, taps, poles), lead=0)
+                        for column in unknowns.T)
+        noise = np.sqrt(sum(one.noise_gain**2 for one in filters))
+        if error <= _TOLERANCE and noise <= _NOISE_SHARE * noise_gain:
+            break
+    return _Fit(filters, problem.lead + wait, error)
 
 
 def _uncertain_axis(model, name):
-    from ..uncertainty.parameters import UncertainAxis, read_covariance
+    from ..uncertainty.parameters import UncertainAxis, for_axis, read_covariance
     stated = model.metadata.get("covariance")
     if stated is None and (given := model.metadata.get("uncertainties")):
         # standard uncertainties alone: without correlations
@@ -204,56 +231,100 @@ def _uncertain_axis(model, name):
                 isinstance(entry, dict) and "std" in entry for entry in given.values()):
             raise ModelError(f"uncertainties: {given!r:.60} given, expected the std of each "
                              "parameter")
-        std = [number(entry["std"], f"uncertainties.{name}.std")
-               for name, entry in given.items()]
+        std = [number(entry["std"], f"uncertainties.{parameter}.std")
+               for parameter, entry in given.items()]
         stated = {"parameters": list(given), "matrix": [
             [std[i]**2 if i == j else 0.0 for j in range(len(std))] for i in range(len(std))]}
     if stated is None:
         return None
     own = model.axis(name)
-    if own.core != model.core:
+    names, matrix, are_own = for_axis(name, *read_covariance(stated))
+    if own.core != model.core and not are_own:
         raise ModelError(f"axes.{name}: has a core of its own, of which the covariance says "
                          "nothing")
-    return UncertainAxis.given(own, *read_covariance(stated))
+    return UncertainAxis.given(own, names, matrix)
 
 
-def _changes(uncertain, s, offset_gain):
-    """Relative changes of the inverse (k, m), those of the offset (k,), and how they were found.
+def _parts(axis):
+    """Parts of an axis's nonlinear spring that have a coefficient."""
+    if not axis.static_force:
+        return ()
+    return tuple(part for part, value in coefficients(axis, axis).items() if value)
 
-    The mean square of a change over the parameters is the sum of squares over k.
+
+def _part_slopes(uncertain, parts):
+    """Derivatives of the parts' coefficients by the parameters, shape (n_parts, p)."""
+    result = np.zeros((len(parts), len(uncertain.values)))
+    for i, value in enumerate(uncertain.values if parts else ()):
+        step = np.zeros(len(uncertain.values))
+        step[i] = _STEP * (abs(value) or 1.0)
+        beside = [(sign, uncertain.at(uncertain.values + sign * step)) for sign in (-1, 1)]
+        beside = [(sign, axis or uncertain.axis, axis is not None) for sign, axis in beside]
+        length = step[i] * sum(is_there for *_, is_there in beside)
+        if length:
+            result[:, i] = sum(sign * _part_values(axis, uncertain, parts)
+                               for sign, axis, _ in beside) / length
+    return result
+
+
+def _part_values(axis, uncertain, parts):
+    known = coefficients(axis, uncertain.axis)
+    return np.array([known[part] for part in parts])
+
+
+def _changes(uncertain, s, offset_gain, parts):
+    """How the inverse moves with the parameters.
+
+    Returns
+    -------
+    changes : ndarray, shape (k, m)
+        Relative changes; their mean square over the parameters is the sum of squares over k.
+    constants : ndarray, shape (k,)
+        Those of the offset.
+    shares : ndarray, shape (k, n_parts)
+        Those of the coefficients of the spring's parts.
+    method : str
+    nonlinearity : float
     """
     from ..uncertainty.parameters import LINEAR
     place = uncertain.names.index("offset") if "offset" in uncertain.names else None
 
     def change(drawn):
         inverse = 1 / uncertain.ratio(drawn, s) - 1
+        inverse[np.abs(inverse) < 1e-4 * _ROUNDING] = 0
         return np.concatenate([inverse.real, inverse.imag])
 
     nonlinearity = uncertain.nonlinearity(change, whole=True)
     if nonlinearity <= LINEAR:
         roots = uncertain.directions()
-        constants = np.zeros(len(roots)) if place is None else offset_gain * roots[place]
-        return -roots.T @ uncertain.slopes(s), constants, "first order", nonlinearity
+        constants = np.zeros(roots.shape[1]) if place is None else offset_gain * roots[place]
+        return (-roots.T @ uncertain.slopes(s), constants,
+                roots.T @ _part_slopes(uncertain, parts).T, "first order", nonlinearity)
     drawn = uncertain.draws(_DRAWS)
     changes = np.array([1 / uncertain.ratio(one, s) - 1 for one in drawn])
-    constants = np.zeros(_DRAWS)
+    constants, shares = np.zeros(_DRAWS), np.zeros((_DRAWS, len(parts)))
     if place is not None:
         constants = offset_gain * np.array([_offset(one) - uncertain.values[place]
                                             for one in drawn])
-    return changes / np.sqrt(_DRAWS), constants / np.sqrt(_DRAWS), "Monte Carlo", nonlinearity
+    if parts:
+        shares = np.array([_part_values(one, uncertain, parts) for one in drawn])
+        shares -= _part_values(uncertain.axis, uncertain, parts)
+    share = np.sqrt(_DRAWS)
+    return changes / share, constants / share, shares / share, "Monte Carlo", nonlinearity
 
 
 def _offset(axis):
     return sum(effect.offset for effect in axis.effects if effect.cause == "offset")
 
 
-def _principal(changes, constants, unit):
+def _principal(changes, constants, shares, unit):
     """Fewest changes with nearly the same sum of squares at all frequencies.
 
     Returns
     -------
     changes : ndarray, shape (k, m)
-    constants : ndarray, shape (k,)
+    constants, shares : ndarray, shape (k',) and (k', n_parts)
+        With what stands without a filter behind those that have one.
     rest : float
         Sum of squares of the other constants.
     """
@@ -261,11 +332,21 @@ def _principal(changes, constants, unit):
     gram = (weighted @ weighted.conj().T).real
     size, rotation = np.linalg.eigh(gram)
     rotation = rotation[:, np.argsort(size)[::-1]]
-    changes, constants = rotation.T @ changes, rotation.T @ constants
+    changes, constants, shares = (rotation.T @ each for each in (changes, constants, shares))
     # what would be missing after the first k, at the worst frequency
     missing = np.cumsum((np.abs(changes / unit)**2)[::-1], axis=0)[::-1].max(axis=1)
     count = int(np.sum(missing > _NEGLECTED**2))
-    return changes[:count], constants[:count], float(np.sum(constants[count:]**2))
+    more_constants, more_shares, rest = _without_filters(constants[count:], shares[count:])
+    return (changes[:count], np.r_[constants[:count], more_constants],
+            np.r_[shares[:count], more_shares], rest)
+
+
+def _without_filters(constants, shares):
+    """Fewest constants and shares with the same sum of squares, and a constant for the rest."""
+    if not shares.any():
+        return np.empty(0), np.empty((0, shares.shape[1])), float(np.sum(constants**2))
+    triangle = np.linalg.qr(np.c_[constants, shares], mode="r")
+    return triangle[:, 0], triangle[:, 1:], 0.0
 
 
 def _fitted(columns, wanted, outside):

@@ -29,6 +29,9 @@ _LEAST_GAIN = 0.2
 # Worst relative errors; N itself is a small part of the signal.
 _TOLERANCE = 2e-3
 _BAND_TOLERANCE = 5e-3
+# Parts of N that come with a coefficient each, and the powers of q, which do, too.
+FRICTION, HYSTERESIS = PARTS = "friction", "hysteresis"
+POWERS = (2, 3)
 _DELAYS = (6, 8, 12, 16, 24, 32, 48, 64)
 
 
@@ -139,6 +142,25 @@ class StaticTermsDesign:
             own_noise=float(np.sum(own**2)), common_noise=float(np.sum(own * main)))
 
 
+def coefficients(axis, nominal):
+    """Coefficients of the parts of N / S in another AxisModel, for the nominal one's q and S.
+
+    Sensitivity and gain move all of them.
+
+    Returns
+    -------
+    dict
+        By power of q, or of `PARTS`.
+    """
+    force = axis.static_force
+    share = nominal.effective_core.sensitivity / axis.effective_core.sensitivity
+    behind, nominally = (np.prod([effect.reference_gain() for effect in one.effects
+                                  if effect.stage > CORE]) for one in (axis, nominal))
+    result = {power: share * value * (nominally / behind)**power
+              for power, value in enumerate(force.polynomial, POWERS[0])}
+    return {**result, FRICTION: share * force.friction_level, HYSTERESIS: share * force.strength}
+
+
 def _loudest(fine):
     """Noise gain of the loudest of the interleaved phases."""
     return float(np.sqrt(np.sum(fine.reshape(-1, POINTS)**2, axis=0).max()))
@@ -165,9 +187,11 @@ class StaticTermsState:
     terms : StaticTerms
     level : ndarray, shape (k,)
         The samples of each axis before the first: a constant.
+    parts : tuple
+        Of `PARTS`, or powers of q: those that are wanted one by one, too.
     """
 
-    def __init__(self, terms, level):
+    def __init__(self, terms, level, parts=()):
         self._terms = terms
         self._states = [FilterState(phase, level) for phase in terms.phases]
         gain = terms.phases[0].static_gain
@@ -176,6 +200,8 @@ class StaticTermsState:
         self._last, self._last_noise = steady, np.zeros_like(steady)
         force = _power_terms(terms.force.polynomial, steady[:, 0])
         self._band = FilterState(terms.band, force)
+        self._parts = {part: FilterState(terms.band, steady[:, 0]**part if part in POWERS
+                                         else np.zeros(len(level))) for part in parts}
         self._z, self._before = np.zeros(len(level)), steady[:, 0].copy()
         weight = np.abs(terms.band.taps)
         rest = np.zeros(len(level))
@@ -185,12 +211,19 @@ class StaticTermsState:
         self._doubt = FilterState(spread, rest)
 
     def process(self, values, variance):
-        """What to add to the corrected samples, and the variance that it brings; shape (k, n).
+        """What the spring adds to the corrected samples.
 
         Parameters
         ----------
         values, variance : ndarray, shape (k, n)
             Samples, and their noise.
+
+        Returns
+        -------
+        added, variance : ndarray, shape (k, n)
+            With the variance that it brings.
+        parts : list of ndarray, shape (k, n)
+            What each of the wanted parts adds with a coefficient of one.
         """
         terms = self._terms
         fine = _interleaved([state.process(values) for state in self._states])
@@ -199,33 +232,37 @@ class StaticTermsState:
         spread = np.concatenate([self._last_noise, noise], axis=1)
         self._last, self._last_noise = q[:, -2:], spread[:, -2:]
         here = q[:, 1:-1]
-        force, doubt = self._force(here, (q[:, 2:] - q[:, :-2]) / 2,
-                                   q[:, 2:] - 2 * here + q[:, :-2],
-                                   terms.velocity_noise * spread[:, 1:-1])
+        force, doubt, parts = self._force(here, (q[:, 2:] - q[:, :-2]) / 2,
+                                          q[:, 2:] - 2 * here + q[:, :-2],
+                                          terms.velocity_noise * spread[:, 1:-1])
         # of the linear noise, this path repeats or cancels a part
         slope = self._slope.process(_slope(terms.force.polynomial, here))[:, ::POINTS]
         added = variance * (2 * slope * terms.common_noise + slope**2 * terms.own_noise)
         added += self._doubt.process(doubt)[:, ::POINTS]**2
-        return self._band.process(force)[:, ::POINTS], added
+        parts = [state.process(here**part if part in POWERS else parts[part])[:, ::POINTS]
+                 for part, state in self._parts.items()]
+        return self._band.process(force)[:, ::POINTS], added, parts
 
     def _force(self, q, change, bend, change_noise):
-        """N at the instants, and the standard deviation of what is not known of it.
+        """N at the instants, the standard deviation of what is not known of it, and its `PARTS`.
 
         change, bend : first and second difference of q; change_noise : the first one's noise.
         """
         force = self._terms.force
         total = _power_terms(force.polynomial, q)
-        doubt = np.zeros_like(q)
+        doubt, parts = np.zeros_like(q), {}
         if force.friction_level:
             # of a velocity that turns between two instants, the mean sign counts
             sign = _mean_sign(change, change_noise**2 + bend**2 / 12)
+            parts[FRICTION] = sign
             total += force.friction_level * sign
             # While the mass sticks, which shows as a velocity below the noise, all that is known
             # of the friction is that it is less than its level; the same where it turns.
             doubt += force.friction_level * np.sqrt(np.maximum(1 - sign**2, 0))
         if force.strength:
-            total += force.strength * self._hysteresis(q)
-        return total, doubt
+            parts[HYSTERESIS] = self._hysteresis(q)
+            total += force.strength * parts[HYSTERESIS]
+        return total, doubt, parts
 
     def _hysteresis(self, q):
         force = self._terms.force

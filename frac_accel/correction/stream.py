@@ -7,7 +7,7 @@ import numpy as np
 
 from ..effects import Circumstances
 from ..errors import FracAccelError
-from .filter import FilterState, ParallelFilter
+from .filter import FilterState, ParallelFilter, UnknownHistory
 from .parameter_uncertainty import ParameterUncertaintyState
 from .static_terms import StaticTermsState
 from .temperature import HeldTemperature
@@ -79,7 +79,7 @@ class Stream:
             raise FracAccelError(f"sample_rate_hz: {sample_rate_hz} given, expected a number above "
                                  "0, or 0 to estimate it from the stamps")
         self._wishes = wishes
-        self._model = model
+        self._adopt(model)
         self._noise_std = noise_std
         self._held, self._held_count, self._advancing = [], 0, False
         self._samples = 0
@@ -154,8 +154,11 @@ class Stream:
         if variance.shape != values.shape:
             raise FracAccelError(f"variance: shape {variance.shape} given, expected "
                                  f"{values.shape}")
-        # no noise has such a variance: it is not known
-        variance = np.where((variance >= 0) & (variance < LARGEST), variance, np.nan)
+        if not len(stamps):
+            return _concatenated([])
+        if not (variance.min() >= 0 and variance.max() < LARGEST):
+            # no noise has such a variance: it is not known
+            variance = np.where((variance >= 0) & (variance < LARGEST), variance, np.nan)
         self._count(values)
         index = np.arange(self._samples, self._samples + len(stamps))
         self._samples += len(stamps)
@@ -225,17 +228,23 @@ class Stream:
         """
         wishes = {**self._wishes, **wishes}
         if self._clock is None:
-            self._model, self._wishes = model, wishes
+            self._adopt(model)
+            self._wishes = wishes
             return _concatenated([])
         prepared, self._prepared = self._prepared, None
         if prepared and prepared[0] is model and prepared[1] == wishes:
             design = prepared[2]
         else:
             design = self._design(model, self.sample_rate_hz, **wishes)
-        self._model, self._wishes = model, wishes
+        self._adopt(model)
+        self._wishes = wishes
         self._use(design)
         self._begin()
         return _concatenated([self._advance(run) for run in self._history])
+
+    def _adopt(self, model):
+        """Take a model as the one in use."""
+        self._model = model
 
     def _design(self, model, sample_rate_hz, **wishes):
         """FilterDesign for a model at a sampling rate."""
@@ -307,7 +316,6 @@ class Stream:
     def _begin(self):
         """Nothing is known of the motion before the next sample."""
         self._states = None
-        self._since_start = 0
         self._kept = None
         self._waiting_index = np.empty(0, np.int64)
         self._waiting_stamps = np.empty(0, np.int64)
@@ -349,17 +357,19 @@ class Stream:
         """Run the filters over samples that follow the ones before."""
         self._waiting_index = np.concatenate([self._waiting_index, run.index])
         self._waiting_stamps = np.concatenate([self._waiting_stamps, run.stamps_ns])
-        stated = ~np.isnan(run.variance)
-        noise_known = (stated | (self._noise_variance > 0)).all(axis=1)
-        index = run.index
-        if (index < 0).any():
+        variance, noise_known, index = run.variance, None, run.index
+        if np.isnan(variance.min()):
+            stated = ~np.isnan(variance)
+            noise_known = (stated | (self._noise_variance > 0)).all(axis=1)
+            variance = np.where(stated, variance, self._noise_variance)
+        if index.min() < 0:
             # a bridged sample is as warm as the one after it, and its variance says nothing of
             # the noise: that of the sample after it does
             following = np.where(index < 0, len(index) - 1, np.arange(len(index)))
             following = np.minimum.accumulate(following[::-1])[::-1]
-            index, noise_known = index[following], noise_known[following]
-        values, variance = self._before(
-            run.values, np.where(stated, run.variance, self._noise_variance), index, run.stamps_ns)
+            index = index[following]
+            noise_known = None if noise_known is None else noise_known[following]
+        values, variance = self._before(run.values, variance, index, run.stamps_ns)
         if self._states is None:
             if self._kept is not None:
                 values = np.concatenate([self._kept[0], values])
@@ -370,7 +380,8 @@ class Stream:
                 return _concatenated([])
             self._fill(values[:warm_up], variance[:warm_up])
             values, variance = values[warm_up:], variance[warm_up:]
-        return self._give(values, variance, noise_known[-len(values):])
+        return self._give(values, variance,
+                          None if noise_known is None else noise_known[-len(values):])
 
     def _fill(self, values, variance):
         """Bring the filters into the state that they have when their taps are first full."""
@@ -394,16 +405,19 @@ class Stream:
             noise.process(variance[:, rows].T)
             later = max(design.noise_gain**2 - head.sum(), 0.0)
             power = np.mean((columns - level[:, None])**2, axis=1)
-            static = None
+            static, parts = None, ()
             if terms:
-                static = StaticTermsState(terms, columns.mean(axis=1) * (not terms.is_coupled))
-                static.process(columns, variance[:, rows].T)
+                static = StaticTermsState(terms, columns.mean(axis=1) * (not terms.is_coupled),
+                                          uncertainty.parts if uncertainty else ())
+                parts = static.process(columns, variance[:, rows].T)[2]
             doubt = None
             if uncertainty:
                 doubt = ParameterUncertaintyState(uncertainty, columns.mean(axis=1))
-                doubt.process(columns)
-            self._states.append((rows, design.filter, state, noise, later, power, static, doubt))
-        self._since_start = self._started = len(values)
+                doubt.process(columns, parts)
+            history = (UnknownHistory(design.filter, len(values) + 1)
+                       if len(design.filter.poles) else None)
+            self._states.append((rows, state, noise, later, history, power[:, None], static,
+                                 doubt))
         # the oldest of the waiting will have been passed over before the first output
         skipped = len(values) - self.design.delay_samples
         fresh = self._waiting_index[:skipped]
@@ -413,26 +427,32 @@ class Stream:
 
     def _give(self, values, variance, noise_known):
         count = len(values)
-        result, spread = np.empty((count, 3)), np.empty((count, 3))
-        for rows, parallel_filter, state, noise, later, power, static, doubt in self._states:
-            result[:, rows] = state.process(values[:, rows].T).T
-            known = variance[:, rows].T
-            history = parallel_filter.unknown_history_after(
-                self._started + 1, self._since_start + 1, count)**2
-            spread[:, rows] = (noise.process(known) + later * known + np.outer(power, history)).T
+        result, spread = np.empty((3, count)), np.empty((3, count))
+        values, variance = np.ascontiguousarray(values.T), np.ascontiguousarray(variance.T)
+        for rows, state, noise, later, history, power, static, doubt in self._states:
+            own, known = values[rows], variance[rows]
+            corrected = state.process(own)
+            total = noise.process(known)
+            if later:
+                total += later * known
+            if history:
+                total += power * history.squared(count)
+            parts = ()
             if static:
-                added, more = static.process(values[:, rows].T, known)
-                result[:, rows] += added.T
-                spread[:, rows] += more.T
+                added, more, parts = static.process(own, known)
+                corrected += added
+                total += more
             if doubt:
-                spread[:, rows] += doubt.process(values[:, rows].T).T
-        spread[~noise_known] = np.nan
-        self._since_start += count
+                total += doubt.process(own, parts)
+            result[rows], spread[rows] = corrected, total
+        result, spread = result.T, spread.T
+        if noise_known is not None:
+            spread[~noise_known] = np.nan
         index, stamps = self._waiting_index[:count], self._waiting_stamps[:count]
         self._waiting_index = self._waiting_index[count:]
         self._waiting_stamps = self._waiting_stamps[count:]
-        given = index > self._last_given
-        if not given.all():
+        if index.min() <= self._last_given:
+            given = index > self._last_given
             index, stamps = index[given], stamps[given]
             result, spread = result[given], spread[given]
         if len(index):

@@ -100,11 +100,13 @@ class SampleClock:
         return _joined(runs)
 
     def _sort(self, index, stamps, values, variance, runs):
-        finite = (np.abs(values) < LARGEST).all(axis=1)
+        size = np.abs(values)
+        # the rule is quick to see
+        finite = None if size.max() < LARGEST else (size < LARGEST).all(axis=1)
         position = 0
         while position < len(index):
             if self._last is None:
-                accepted = 1 if finite[position] else 0
+                accepted = 1 if finite is None or finite[position] else 0
                 if accepted:
                     self._begin(stamps[position], values[position])
                     runs.append(Run(index[position:position + 1], stamps[position:position + 1],
@@ -114,14 +116,16 @@ class SampleClock:
                     self.counters["not_finite"] += 1
                 position += 1
                 continue
-            accepted = self._accept(stamps[position:], values[position:], finite[position:])
+            accepted = self._accept(stamps[position:], values[position:],
+                                    None if finite is None else finite[position:])
             if accepted:
                 part = slice(position, position + accepted)
                 runs.append(Run(index[part], stamps[part], values[part], variance[part], False))
                 position += accepted
             if position < len(index):
                 one = slice(position, position + 1)
-                bridge = self._exception(stamps[position], values[position], finite[position])
+                bridge = self._exception(stamps[position], values[position],
+                                         finite is None or finite[position])
                 if bridge is not None:
                     filled_stamps, filled_values, filled_variance = bridge
                     runs.append(Run(
@@ -139,26 +143,35 @@ class SampleClock:
 
     def _accept(self, stamps, values, finite):
         """Number of leading samples that simply follow; the clock is moved on by these."""
-        steps = np.diff(stamps, prepend=self._last)
+        steps = np.empty_like(stamps)
+        np.subtract(stamps[:1], self._last, out=steps[:1])
+        np.subtract(stamps[1:], stamps[:-1], out=steps[1:])
         ahead = np.arange(self._count + 1, self._count + 1 + len(stamps))
         # time against a clock that started with the first stamp; its slow mean is the clock's error
         late = (stamps - self._origin) - ahead * self.interval_ns
         mean = run_filter(*_FOLLOWING, late[None], (1.0 - _FOLLOW) * self._offset[None])[0][0]
-        error = late.copy()
-        error[0] -= self._offset[0]
-        error[1:] -= mean[:-1]
-        error /= self.interval_ns
-        plain = finite & (steps > 0) & (np.abs(error) < MISSING)
-        accepted = len(plain) if plain.all() else int(np.argmin(plain))
+        late[0] -= self._offset[0]
+        late[1:] -= mean[:-1]
+        error = np.abs(late / self.interval_ns)
+        largest = error.max()
+        if finite is None and largest < MISSING and steps.min() > 0:
+            accepted = len(stamps)
+        else:
+            plain = (steps > 0) & (error < MISSING) & (True if finite is None else finite)
+            accepted = len(plain) if plain.all() else int(np.argmin(plain))
         if accepted:
-            self.counters["jitter"] += int(np.sum(np.abs(error[:accepted]) > JITTER))
+            if largest > JITTER:
+                self.counters["jitter"] += int(np.count_nonzero(error[:accepted] > JITTER))
             self._follow(stamps[:accepted], values[:accepted], mean[accepted - 1:accepted])
             self._backward = 0
         return accepted
 
     def _follow(self, stamps, values, offset):
-        increments = np.diff(np.concatenate([self._last_values[None], values]), axis=0)**2
-        scatter, _ = run_filter(*_SCATTERING, increments.T,
+        increments = np.empty((3, len(values)))
+        increments[:, 0] = values[0] - self._last_values
+        np.subtract(values[1:].T, values[:-1].T, out=increments[:, 1:])
+        increments *= increments
+        scatter, _ = run_filter(*_SCATTERING, increments,
                                 (1.0 - _SCATTER_MEMORY) * self._scatter.T)
         self._scatter = scatter[:, -1][None]
         self._offset = offset

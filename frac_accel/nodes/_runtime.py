@@ -34,7 +34,7 @@ from frac_accel.errors import FracAccelError
 # The longest that a signal or the end of a node's work goes unnoticed.
 _POLL_S = 0.1
 # How often timers, services and all that is not taken directly have their turn beside it.
-_EXECUTOR_PERIOD_S = 0.02
+_EXECUTOR_PERIOD_S = 0.05
 
 INVALID_ENDPOINT = (
     InvalidTopicNameException,
@@ -287,11 +287,11 @@ class RawSubscription:
         self._callback([self._received(data, info), *self._waiting()])
 
     def _received(self, data: bytes, info) -> RawMessage:
-        sequence = info["publication_sequence_number"]
+        sequence, last = info["publication_sequence_number"], self._last_sequence
         if sequence is not None:
-            gap = 0 if self._last_sequence is None else sequence - self._last_sequence - 1
-            if gap > 0 and self.subscription.get_publisher_count() <= 1:
-                self.lost += gap
+            if (last is not None and sequence > last + 1
+                    and self.subscription.get_publisher_count() <= 1):
+                self.lost += sequence - last - 1
             self._last_sequence = sequence
         received = info["received_timestamp"] or time.time_ns()
         return RawMessage(data, info["source_timestamp"] or received, received)
@@ -305,7 +305,7 @@ class RawSubscription:
             with handle:
                 take, message_class, received = (
                     handle.take_message, self._message_class, self._received)
-                while len(batch) < self._MAX_BATCH:
+                for _ in range(self._MAX_BATCH):
                     taken = take(message_class, True)
                     if taken is None:
                         break

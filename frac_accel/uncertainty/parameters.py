@@ -34,8 +34,9 @@ class UncertainAxis:
     The covariance is that of the model file: ``covariance: {parameters: [...], matrix: [[...]]}``.
     Parameters are named as `identify` names them (those of the core, ``a1`` ... and ``b0`` ... of
     a transfer function in z, those of `from_sensor_parameters` of a general equation, ``delay_s``,
-    ``offset``); those of other effects as ``low_pass_lag.corner_hz``. What stands on the common
-    core and effects holds for each axis that has no model of its own.
+    ``offset``); those of other effects as ``low_pass_lag.corner_hz``. These hold for each axis that
+    has no model of its own. Parameters of one axis alone begin with ``axes.z.``, as in
+    ``axes.z.damping_ratio``; an axis that has any is described by these alone.
 
     Attributes
     ----------
@@ -64,13 +65,11 @@ class UncertainAxis:
             If the model has no covariance, or one that names no parameter of the axis twice, is
             not square, symmetric and positive semidefinite, or belongs to another axis.
         """
-        own = model.axis(axis)
-        common = AxisModel(model.core, model.effects)
-        if own != common:
-            name = axis if isinstance(axis, str) else AXES[axis]
+        own, name = model.axis(axis), axis if isinstance(axis, str) else AXES[axis]
+        names, matrix, are_own = for_axis(name, *read_covariance(model.metadata.get("covariance")))
+        if own != AxisModel(model.core, model.effects) and not are_own:
             raise ModelError(f"axes.{name}: has a model of its own, of which the covariance says "
                              "nothing")
-        names, matrix = read_covariance(model.metadata.get("covariance"))
         return cls.given(own, names, matrix)
 
     @classmethod
@@ -247,6 +246,35 @@ def read_covariance(entry):
         raise ModelError("covariance.matrix: not positive semidefinite, the smallest eigenvalue "
                          f"of its correlation matrix is {smallest:.3g}")
     return names, (matrix + matrix.T) / 2
+
+
+def for_axis(axis, names, matrix):
+    """What a covariance says of one axis, ``"x"``, ``"y"`` or ``"z"``.
+
+    Returns
+    -------
+    names : list of str
+        Without the ``axes.z.`` of parameters of one axis alone.
+    matrix : ndarray
+    are_own : bool
+        Whether they are of that axis alone.
+
+    Raises
+    ------
+    ModelError
+        If a name is of no axis, or all are of other axes.
+    """
+    whose = [name.split(".", 2)[1] if name.startswith("axes.") else "" for name in names]
+    for i, owner in enumerate(whose):
+        if owner not in ("", *AXES) or owner and names[i].count(".") < 2:
+            raise ModelError(f"covariance.parameters[{i}]: {names[i]}: no such axis, expected "
+                             "axes.x, axes.y or axes.z and a parameter")
+    wanted = axis if axis in whose else ""
+    places = [i for i, owner in enumerate(whose) if owner == wanted]
+    if not places:
+        raise ModelError(f"axes.{axis}: the covariance says nothing of this axis")
+    names = [names[i].removeprefix(f"axes.{axis}.") for i in places]
+    return names, matrix[np.ix_(places, places)], bool(wanted)
 
 
 def _owner(name):
