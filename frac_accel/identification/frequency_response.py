@@ -18,8 +18,10 @@ def bulk_delay(reference, sensor):
     length = next_fast_len(n + n // 4 + 1, real=True)
     shared = irfft(np.conj(rfft(reference - reference.mean(), length))
                    * rfft(sensor - sensor.mean(), length), length)
-    lags = np.r_[0:n // 4, -(n // 4):0]
-    return int(lags[np.argmax(np.abs(shared[lags]))])
+    shared = np.abs(shared)
+    most = n // 4
+    later, earlier = int(np.argmax(shared[:most])), int(np.argmax(shared[-most:])) - most
+    return later if shared[later] >= shared[earlier] else earlier
 
 
 def averaged_response(reference, sensor, sampling_rate_hz, delay):

@@ -157,6 +157,8 @@ class _Problem:
         moving = np.r_[way * (reference[0] - self.level), reference - self.level]
         self.convolution = Convolution(moving, rate, 2 * _EDGE / rate)
         self.prepared = structure.prepare(self.convolution.s)
+        # derivative of a delay by one sample
+        self.shift = -self.convolution.s / rate
         edge = min(_EDGE, self.n // 8)
         used = np.ones(self.n, bool) if valid is None else valid.copy()
         used[:edge] = used[-edge:] = False
@@ -241,9 +243,9 @@ class _Problem:
         Besides, their number without the derivatives, the free swing and its pole's derivatives.
         """
         own, delay = theta[:-1], theta[-1] / self.rate - self.lag_s
-        response, slopes = self.structure.gradient(self.prepared, own)
-        spectra = np.array([response, *slopes, response * (-self.convolution.s / self.rate)])
         s = self.convolution.s
+        response, slopes = self.structure.gradient(self.prepared, own)
+        spectra = np.array([response, *slopes, response * self.shift])
         spectra *= _exponential(-s[0] * delay, -(s[1] - s[0]) * delay, len(s))
         simulated = self.convolution.response(spectra)[:, _WAY:][:, self.judged]
         # one that is over long before the first used sample is none
@@ -338,7 +340,7 @@ class _Problem:
                       swing, real)
 
     def require_relation(self, explained):
-        if explained < min(_CHANCE / self.independent(), 0.5):
+        if explained < 0.5 and explained < _CHANCE / self.independent():
             raise IdentificationError(
                 "the sensor's output has nothing to do with the reference: the best model explains "
                 f"{max(explained, 0):.2%} of its power, which chance alone can do; were both "
@@ -350,6 +352,25 @@ class _Problem:
         full[self.judged] = self.sensor - self.sensor.mean()
         shared = np.abs(rfft(full))**2 * np.abs(rfft(self.reference - self.reference.mean()))**2
         return np.sum(shared)**2 / np.sum(shared**2)
+
+    def curvature(self, own, covariance):
+        """Second-order part of the physical parameters' covariance.
+
+        Mean square of the quadratic terms of Gaussian unknowns with this covariance (JCGM 100:2008,
+        5.1.2, note, has the variances). Where a damping order of about 1 is not well known, the
+        first derivative of the damping ratio by it, which is nought there, tells nothing.
+        """
+        slopes = np.zeros((len(own),) * 3)
+        for place, reach in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0))):
+            ends = np.clip(own + np.outer([1, -1], np.eye(len(own))[place] * reach),
+                           self.low[:-1], self.high[:-1])
+            if ends[0, place] > ends[1, place]:
+                above, below = (self.structure.physical(end)[1] for end in ends)
+                slopes[:, :, place] = (above - below) / (ends[0, place] - ends[1, place])
+        quadratic = 0.5 * (slopes + slopes.transpose(0, 2, 1)) @ covariance
+        mean = np.einsum("ijj->i", quadratic)
+        return (0.5 * np.einsum("ijk,lkj->il", quadratic, quadratic)
+                + 0.25 * np.outer(mean, mean))
 
     def result(self, state, uncertainty=True):
         """The fit in physical units; without `uncertainty` its covariance is NaN."""
@@ -384,6 +405,10 @@ class _Problem:
                 within += np.outer(beyond, beyond)
             covariance = np.zeros_like(covariance)
             covariance[np.ix_(free, free)] = within[:len(free), :len(free)]
+            own_places = slice(1, 1 + len(own))
+            covariance[own_places, own_places] += self.curvature(
+                theta[:-1], np.linalg.solve(factors, np.linalg.solve(
+                    factors, covariance[own_places, own_places]).T))
         full = np.full(self.n, np.nan)
         full[self.used] = state.residual
         offset = linear[1] - linear[0] * self.level
