@@ -227,5 +227,6 @@ class _Problem:
         at_bounds = tuple(name for name, side in zip(self.structure.names, found.active_mask[1:])
                           if side)
         return ResponseFit(("sensitivity", *self.structure.names, "delay_s"), values, covariance,
-                           found.fun, found.x[1:], at_bounds, None, float(chi_squared),
+                           found.fun, found.x[1:], at_bounds, None, 0.0, np.nan,
+                           float(chi_squared),
                            float(np.sqrt(np.mean(np.abs(self.parts(found.x)[0] - 1)**2))))
