@@ -136,7 +136,7 @@ class _Problem:
         prepared = self.structure.prepare(s)
         peak = frequency[np.argmax(np.abs(self.response))]
         grid = self.structure.grid(frequency[0], frequency[-1], peak)
-        models = self.structure.gradient(prepared, grid.T[:, :, None])[0]
+        models = self.structure.response(prepared, grid.T[:, :, None])
         relative = models / response
         reach = 1 / frequency[len(frequency) // 2] + 2 / self.rate
         delays = delay_s + np.linspace(-reach, reach, _START_DELAYS)

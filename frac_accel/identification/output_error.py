@@ -235,7 +235,7 @@ class _Problem:
         prepared = self.structure.prepare(s)
         peak = frequency[np.argmax(np.abs(response))]
         grid = self.structure.grid(frequency[0], frequency[-1], peak)
-        models = self.structure.gradient(prepared, grid.T[:, :, None])[0]
+        models = self.structure.response(prepared, grid.T[:, :, None])
         # the correlation may have peaked half a period of the resonance away from the delay
         energy = weight * np.abs(response)**2
         reach = 0.75 * self.rate * np.sum(energy) / np.sum(energy * frequency) + 2

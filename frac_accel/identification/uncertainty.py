@@ -31,20 +31,21 @@ def sandwich(jacobian, residual, used):
     """
     scale = np.linalg.norm(jacobian, axis=0)
     scaled = (jacobian / scale).T
-    full = np.zeros((len(scaled) + 1, len(used)))
+    rows = np.concatenate([scaled, residual[None]])
     first, last = np.flatnonzero(used)[[0, -1]]
-    where = slice(first, last + 1) if last + 1 - first == len(residual) else used
-    full[:-1, where] = scaled
-    full[-1, where] = residual
+    # where the rows begin turns all spectra alike; only gaps need their place
+    if last + 1 - first > len(residual):
+        rows, present = np.zeros((len(rows), len(used))), rows
+        rows[:, used] = present
     # the smoothed spectrum reaches over lags of a few times the root of the record
     length = next_fast_len(len(used) + int(_REACH * np.sqrt(len(used))), real=True)
-    spectra = rfft(full, length, axis=1)
+    spectra = rfft(rows, length, axis=1)
     power = spectra[-1].real**2 + spectra[-1].imag**2
     values, vectors = np.linalg.eigh(scaled @ scaled.T)
     root = vectors / np.sqrt(np.maximum(values, 1e-14 * values[-1]))
     fitted = root.T @ spectra[:-1]
     # what a fit to white noise leaves of each line
-    left = len(residual) - np.einsum("pk,pk->k", fitted, fitted.conj()).real
+    left = len(residual) - np.sum(np.square(fitted.view(float)), axis=0).reshape(-1, 2).sum(axis=1)
     width = max(5, int(len(power) / np.sqrt(len(used))))
     power, left = (uniform_filter1d(v, width, mode="reflect") for v in (power, left))
     smooth = power / np.maximum(left, _LEAST * len(residual))
