@@ -19,15 +19,19 @@ from frac_accel import identify
 from frac_accel.pair import Pair
 
 RATE_HZ, DURATION_S = 2000.0, 5.0
-KINDS = {"oscillator": "classical", "fractional": "fractional",
-         "fractional_transfer_function": "fractional_transfer_function"}
+# kinds of sensors that each structure is identified from
+KINDS = {"oscillator": ("classical",), "fractional": ("fractional",),
+         "fractional_transfer_function": ("fractional_transfer_function",),
+         "arx": ("arx", "classical")}
 COLOURS = {"white": (), "AR(0.9)": (0.9,)}
 S = 2j * np.pi * np.geomspace(10, 600, 50)
 
 
 def clean_record(rng, kind):
     """A random sensor, the reference and the sensor's output without noise."""
-    sensor = rig.draw_sensor(rng, RATE_HZ, kind, ["time_delay", "offset"])
+    # no transfer function in z has a fraction of a sample of delay
+    effects = ["offset"] if kind == "arx" else ["time_delay", "offset"]
+    sensor = rig.draw_sensor(rng, RATE_HZ, kind, effects)
     excitation = rig.band_noise(rng, RATE_HZ, DURATION_S, (5.0, 700.0), (1.0, 0.0, 0.0), lead_s=1.0)
     record = rig.simulate_record(sensor, excitation)
     return sensor, record.reference, record.clean
@@ -56,12 +60,13 @@ def response_scores(result, sensor):
     names = list(result.parameters)
     values = np.array([result.parameters[name]["value"] for name in names])
     covariance = np.array(result.model.metadata["covariance"]["matrix"])
-    response = general_response(dict(zip(names, values)))
+    response_of = rational_response if result.structure == "arx" else general_response
+    response = response_of(dict(zip(names, values)))
     slopes = []
     for place, value in enumerate(values):
         step = 1e-5 * max(abs(value), 1e-6)
         moved = np.where(np.arange(len(values)) == place, values + step, values)
-        slopes.append((general_response(dict(zip(names, moved))) / response - 1) / step)
+        slopes.append((response_of(dict(zip(names, moved))) / response - 1) / step)
     slopes = np.array(slopes)
     error = np.log(response / rig.transfer_function(sensor, "x", S))
     scores, errors = {}, {}
@@ -81,33 +86,67 @@ def general_response(values):
                + 2 * values["damping_ratio"] * u**values["damping_order"] + 1))
 
 
-def coverage(structure, runs, seed, snrs_db):
+def rational_response(values):
+    """Response at `S` of a transfer function in z."""
+    back = np.exp(-S / RATE_HZ)
+    a, b = ([value for name, value in values.items() if name[0] == letter and name[1:].isdigit()]
+            for letter in "ab")
+    return (np.exp(-S * values["delay_s"]) * np.polyval(b[::-1], back)
+            / np.polyval([*a[::-1], 1.0], back))
+
+
+def pole_scores(result, sensor):
+    """Natural frequency and damping ratio in s, for a model with one pair of poles."""
+    pairs = result.model.metadata["continuous_equivalent"]["poles"]
+    if len(pairs) != 1 or "a3" in result.parameters:
+        return {}, {}
+    truth = sensor.core
+    if truth["type"] == "arx":
+        pole = RATE_HZ * np.log(np.roots(truth["denominator"])[0] + 0j)
+        truth = {"natural_frequency_hz": abs(pole) / (2 * np.pi),
+                 "damping_ratio": -pole.real / abs(pole)}
+    errors = {name: (entry["value"] - truth[name], entry["std"], truth[name])
+              for name, entry in pairs[0].items()}
+    return ({name: abs(error / std) for name, (error, std, _) in errors.items()},
+            {name: abs(error / value) for name, (error, _, value) in errors.items()})
+
+
+def scores_of(result, sensor):
+    """Errors over standard uncertainties and relative errors by name; None if not determined."""
+    if result.structure == "fractional_transfer_function":
+        # undetermined parameters may well determine the response
+        return response_scores(result, sensor)
+    if result.structure == "arx":
+        return tuple({**whole, **poles} for whole, poles in
+                     zip(response_scores(result, sensor), pole_scores(result, sensor)))
+    if any("not determined" in note for note in result.notes):
+        return None
+    return parameter_scores(result, sensor)
+
+
+def coverage(structure, kind, runs, seed, snrs_db):
     """One row for each colour and level of the noise."""
     table = {}
     for run in range(runs):
         rng = np.random.default_rng([seed, run])
-        sensor, reference, clean = clean_record(rng, KINDS[structure])
+        sensor, reference, clean = clean_record(rng, kind)
         for colour, noise_ar in COLOURS.items():
             for snr_db in snrs_db:
                 pair = noisy_pair(rng, reference, clean, snr_db, noise_ar)
-                result = identify(pair, structure=structure)
-                if structure == "fractional_transfer_function":
-                    # undetermined parameters may well determine the response
-                    entry = True, *response_scores(result, sensor)
-                else:
-                    entry = (not any("not determined" in note for note in result.notes),
-                             *parameter_scores(result, sensor))
-                table.setdefault((colour, snr_db), []).append(entry)
+                table.setdefault((colour, snr_db), []).append(
+                    scores_of(identify(pair, structure=structure), sensor))
     for (colour, snr_db), entries in table.items():
-        determined = [entry[1:] for entry in entries if entry[0]]
+        determined = [entry for entry in entries if entry is not None]
         low, high = scipy.stats.binom.interval(0.95, len(determined), 0.95)
-        print(f"{structure}, {colour}, {snr_db:g} dB: {len(determined)} of {runs} runs determined; "
-              f"a true 95 % gives {low / len(determined):.3f} to {high / len(determined):.3f}")
-        for name in determined[0][0]:
-            scores = np.concatenate([np.atleast_1d(entry[0][name]) for entry in determined])
-            errors = [entry[1][name] for entry in determined]
-            print(f"  {name:22} covered {np.mean(scores < 1.96):.3f}  "
-                  f"median relative error {np.median(errors):.2g}", flush=True)
+        print(f"{structure} of {kind} sensors, {colour}, {snr_db:g} dB: {len(determined)} of "
+              f"{runs} runs determined; a true 95 % gives {low / len(determined):.3f} to "
+              f"{high / len(determined):.3f}")
+        for name in dict.fromkeys(name for entry in determined for name in entry[0]):
+            known = [entry for entry in determined if name in entry[0]]
+            scores = np.concatenate([np.atleast_1d(entry[0][name]) for entry in known])
+            errors = [entry[1][name] for entry in known]
+            print(f"  {name:22} covered {np.mean(scores < 1.96):.3f}  median relative error "
+                  f"{np.median(errors):.2g}  ({len(known)} runs)", flush=True)
 
 
 def choices(runs, seed, snrs_db):
@@ -139,7 +178,8 @@ def main():
         if what == "auto":
             choices(arguments.runs, arguments.seed, arguments.snr)
         else:
-            coverage(what, arguments.runs, arguments.seed, arguments.snr)
+            for kind in KINDS[what]:
+                coverage(what, kind, arguments.runs, arguments.seed, arguments.snr)
 
 
 if __name__ == "__main__":

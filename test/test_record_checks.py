@@ -264,6 +264,23 @@ def test_record_shorter_than_the_memory(tmp_path, capsys):
     assert 0.75 < memory < 1.05 / (3e-4 * 2 * np.pi * 100)
 
 
+@pytest.mark.parametrize("structure", ["oscillator", "fractional"])
+@pytest.mark.parametrize("natural_hz, ratio, samples", [
+    (100.0, 3e-4, 1500), (100.0, 1.2e-4, 1500), (30.0, 1e-3, 1500), (10.0, 5e-3, 2000),
+    (4.0, 0.05, 1200), (2.0, 0.02, 2000), (200.0, 2e-4, 1000)])
+def test_sensor_that_rings_on_from_before_the_record(natural_hz, ratio, samples, structure):
+    """Recorded in mid-motion, for less than the free motion takes to decay to 1/e."""
+    rng = np.random.default_rng([20261201, samples])
+    memory_s = 1 / (2 * np.pi * natural_hz * ratio)
+    assert memory_s > samples / RATE_HZ
+    excitation = rig.band_noise(rng, RATE_HZ, samples / RATE_HZ, (5.0, 600.0), X_ONLY,
+                                lead_s=min(5 * memory_s, 20.0))
+    _, reference, raw = measured(45, excitation, natural_frequency=(natural_hz / RATE_HZ,) * 2,
+                                 damping_ratio=(ratio, ratio))
+    with pytest.raises(IdentificationError, match="takes at least|still rings"):
+        identify(make_pair(reference, raw), structure=structure)
+
+
 @pytest.mark.parametrize("share", [-0.6, -0.3, 0.3, 0.6])
 def test_delay_of_much_of_the_record(share, tmp_path, capsys):
     """Windows of one motion, `share` of their length apart, under the same stamps."""

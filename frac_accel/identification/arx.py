@@ -498,7 +498,8 @@ def _result(record, problem, orders, theta, rate, lag_s):
              "delay_s", "offset")
     values = np.r_[a, b, orders.delay / rate + lag_s, offset]
     return ArxFit(names, values, factors @ covariance @ factors.T, full,
-                  (orders, theta[:count]), (), None, orders, rate, lag_s)
+                  (orders, theta[:count]), (), None, 0.0, np.nan, orders,
+                  rate, lag_s)
 
 
 def _solve(matrix, right, size):

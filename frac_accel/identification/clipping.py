@@ -129,6 +129,8 @@ def _clipped(values, valid, model):
 
 def _pile_up(values):
     """Greatest value if suspiciously many samples have it, else None."""
+    if np.count_nonzero(values == values.max()) < _FEWEST:
+        return None
     distinct, counts = np.unique(values, return_counts=True)
     if len(distinct) <= _NEXT_VALUES:
         return None

@@ -18,6 +18,8 @@ _UNCERTAINTIES = 2
 # A fit that ends at the least damping of the search has found none.
 _LEAST_DAMPING = 1.01e-4
 _KNOWN = 0.2
+# Power of the free motion, of the output, that is much of it.
+_FREE = 0.3
 
 
 def require_time_to_answer(fit, pair):
@@ -80,19 +82,25 @@ def _require_memory(fit, duration):
     """Refuse a record that ends before the sensor has forgotten how it began."""
     std = dict(zip(fit.names, fit.std))
     frequency, ratio = fit["natural_frequency_hz"], fit["damping_ratio"]
-    if std["natural_frequency_hz"] > _KNOWN * frequency or ratio < _LEAST_DAMPING:
-        return
-    # a damping that is too small to show in the record has an upper limit at least
-    ratio += _UNCERTAINTIES * std["damping_ratio"]
-    order = fit["damping_order"] if "damping_order" in fit.names else 1.0
-    slowest = max((pole.real for pole in Oscillator(frequency, ratio, order).poles()),
-                  default=-np.inf)
-    memory = -1 / slowest
-    if memory > duration:
+    known = std["natural_frequency_hz"] <= _KNOWN * frequency and ratio >= _LEAST_DAMPING
+    if known:
+        # a damping that is too small to show in the record has an upper limit at least
+        ratio += _UNCERTAINTIES * std["damping_ratio"]
+        order = fit["damping_order"] if "damping_order" in fit.names else 1.0
+        slowest = max((pole.real for pole in Oscillator(frequency, ratio, order).poles()),
+                      default=-np.inf)
+        memory = -1 / slowest
+        if memory > duration:
+            raise IdentificationError(
+                f"the record lasts {duration:.3g} s, but the sensor's free motion takes at least "
+                f"{memory:.3g} s to decay to 1/e (natural frequency {frequency:.4g} Hz, damping "
+                f"ratio at most {ratio:.3g}): record at least {3 * memory:.3g} s")
+    # of a free order, the decay is known better than the parameters that it is made of
+    if fit.free_share > _FREE and not (known and fit.fastest_decay * duration > 1):
         raise IdentificationError(
-            f"the record lasts {duration:.3g} s, but the sensor's free motion takes at least "
-            f"{memory:.3g} s to decay to 1/e (natural frequency {frequency:.4g} Hz, damping ratio "
-            f"at most {ratio:.3g}): record at least {3 * memory:.3g} s")
+            f"the sensor still rings at {frequency:.4g} Hz from before the record, which with "
+            f"{duration:.3g} s is too short to tell how this decays: record several times longer "
+            "than the sensor rings")
 
 
 def _too_late(delay_s, duration_s):

@@ -113,8 +113,8 @@ def judge_residual(core, fit, reference, pair):
     if fit.gradient is None:
         gradient = _gradient(core, fit, reference, pair)
     else:
-        gradient = np.zeros((len(used), len(fit.gradient)))
-        gradient[used] = fit.gradient.T
+        gradient = np.zeros((len(fit.gradient), len(used)))
+        gradient[:, used] = fit.gradient
     try:
         return residual_tests(fit.residual, reference, pair.valid, gradient)
     except FracAccelError:
@@ -122,7 +122,7 @@ def judge_residual(core, fit, reference, pair):
 
 
 def _gradient(core, fit, reference, pair):
-    """Derivatives of the model's output by its parameters, shape (n, p)."""
+    """Derivatives of the model's output by its parameters, shape (p, n)."""
     # the pair's lag belongs to the stamps, not to the sensor
     delay = fit["delay_s"] - pair.lag_s
     uncertain = UncertainAxis.given(AxisModel(core, (TimeDelay(delay),)), fit.names,
@@ -131,7 +131,7 @@ def _gradient(core, fit, reference, pair):
     s = convolution.s
     response = core.transfer_function(s) * np.exp(-s * delay)
     return np.stack([convolution.response(response * slope)
-                     for slope in uncertain.slopes(s) if slope.any()], axis=1)
+                     for slope in uncertain.slopes(s) if slope.any()])
 
 
 def band_fits(measured, simulated, sampling_rate_hz, bands):

@@ -136,7 +136,7 @@ class _Problem:
         prepared = self.structure.prepare(s)
         peak = frequency[np.argmax(np.abs(self.response))]
         grid = self.structure.grid(frequency[0], frequency[-1], peak)
-        models = self.structure.gradient(prepared, grid.T[:, :, None])[0]
+        models = self.structure.response(prepared, grid.T[:, :, None])
         relative = models / response
         reach = 1 / frequency[len(frequency) // 2] + 2 / self.rate
         delays = delay_s + np.linspace(-reach, reach, _START_DELAYS)
@@ -227,5 +227,6 @@ class _Problem:
         at_bounds = tuple(name for name, side in zip(self.structure.names, found.active_mask[1:])
                           if side)
         return ResponseFit(("sensitivity", *self.structure.names, "delay_s"), values, covariance,
-                           found.fun, found.x[1:], at_bounds, None, float(chi_squared),
+                           found.fun, found.x[1:], at_bounds, None, 0.0, np.nan,
+                           float(chi_squared),
                            float(np.sqrt(np.mean(np.abs(self.parts(found.x)[0] - 1)**2))))

@@ -7,6 +7,8 @@ from .averaged_spectra import coherence_of, power_of, segment_spectra
 
 _SEGMENTS = 4
 _MOST_BINS = 200
+# Power of a line, of the strongest, whose phase counts.
+_EXCITED = 1e-3
 # For a share of power: few frequencies, so that chance has little of it.
 _SHARE_SEGMENTS = 32
 
@@ -18,8 +20,29 @@ def bulk_delay(reference, sensor):
     length = next_fast_len(n + n // 4 + 1, real=True)
     shared = irfft(np.conj(rfft(reference - reference.mean(), length))
                    * rfft(sensor - sensor.mean(), length), length)
-    lags = np.r_[0:n // 4, -(n // 4):0]
-    return int(lags[np.argmax(np.abs(shared[lags]))])
+    shared = np.abs(shared)
+    most = n // 4
+    later, earlier = int(np.argmax(shared[:most])), int(np.argmax(shared[-most:])) - most
+    return later if shared[later] >= shared[earlier] else earlier
+
+
+def phase_delay(reference, sensor):
+    """The same from the phases alone (C. Knapp, G. Carter, IEEE Trans. ASSP 24 (1976) 320-327).
+
+    Each line where the reference has power counts alike: what still rings from before the record
+    is loud, but in few of them.
+    """
+    n = len(reference)
+    length = next_fast_len(n + n // 4 + 1, real=True)
+    taper = np.hanning(n)
+    moving, answer = (rfft(taper * (values - values.mean()), length)
+                      for values in (reference, sensor))
+    power = np.abs(moving)**2
+    shared = np.where(power > _EXCITED * power.max(), np.conj(moving) * answer, 0.0)
+    shared = np.abs(irfft(shared / np.maximum(np.abs(shared), 1e-300), length))
+    most = n // 4
+    later, earlier = int(np.argmax(shared[:most])), int(np.argmax(shared[-most:])) - most
+    return later if shared[later] >= shared[earlier] else earlier
 
 
 def averaged_response(reference, sensor, sampling_rate_hz, delay):

@@ -9,7 +9,7 @@ from scipy.fft import rfft
 from ..convolution import Convolution
 from ..errors import IdentificationError
 from .excitation import strongest_stretch
-from .frequency_response import averaged_response, bulk_delay
+from .frequency_response import averaged_response, bulk_delay, phase_delay
 from .uncertainty import sandwich, white_noise
 
 # Samples at both ends that the band-limited simulation cannot know, besides the unknown start.
@@ -32,6 +32,16 @@ _OVER = -20.0
 # Energy, in variances of the noise, of a free motion that noise alone may show: the largest of a
 # spectrum of 1e5 lines has 23.
 _FEIGNED = 50.0
+# Power of the free motions, of the output, from which on they are no small part of it.
+_RINGING = 0.05
+# Share of the output's power below which a model explains little of it.
+_POOR = 0.7
+# Samples by which no sensor is earlier than what moves it.
+_EARLY = 2
+# Starting points half a period away that are tried then.
+_HALF_AWAY = 4
+# Distance of the logarithms of frequencies that count as one.
+_BESIDE = 1e-9
 _START_LENGTH = 16384
 _TRIAL_ITERATIONS = 5
 # Share of the output's power, times the number of independent frequencies, that the best of all
@@ -59,6 +69,10 @@ class Fit:
         The structure's parameters with which it ended at a bound of the search.
     gradient : ndarray, shape (p - 1, m), or None
         Derivatives of the output by all parameters but the offset, at the m samples that count.
+    free_share : float
+        Power of the free swing that began before the record, of the output's.
+    fastest_decay : float
+        Rate of the free swing's decay [1/s], two standard uncertainties added; NaN without one.
     """
 
     names: tuple
@@ -68,6 +82,8 @@ class Fit:
     unknowns: np.ndarray
     at_bounds: tuple
     gradient: np.ndarray | None
+    free_share: float
+    fastest_decay: float
 
     @property
     def std(self):
@@ -137,11 +153,19 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
         rough = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
                          None if valid is None else valid[part], lag_s)
         state = rough.solve(rough.starts() if hint is None else [hint, *rough.starts()])
+        if (state.free_share > _RINGING or rough.explained(state) < _POOR
+                or state.theta[-1] < -_EARLY):
+            # what still rings from before the record may have led astray
+            other = rough.solve(rough.ringing_starts())
+            state = min(state, other, key=lambda state: state.cost)
+        rough.require_relation(state)
         if rough.n == len(sensor):
             return rough.result(state, uncertainty)
         start = state.theta
     problem = _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s, held)
-    return problem.result(problem.solve([start]), uncertainty)
+    state = problem.solve([start])
+    problem.require_relation(state)
+    return problem.result(state, uncertainty)
 
 
 class _Problem:
@@ -157,6 +181,8 @@ class _Problem:
         moving = np.r_[way * (reference[0] - self.level), reference - self.level]
         self.convolution = Convolution(moving, rate, 2 * _EDGE / rate)
         self.prepared = structure.prepare(self.convolution.s)
+        # derivative of a delay by one sample
+        self.shift = -self.convolution.s / rate
         edge = min(_EDGE, self.n // 8)
         used = np.ones(self.n, bool) if valid is None else valid.copy()
         used[:edge] = used[-edge:] = False
@@ -183,8 +209,23 @@ class _Problem:
         for state in others:
             if state.cost < best.cost * (1 - 1e-9):
                 best = state
-        self.require_relation(1 - best.cost / (len(self.sensor) * self.size**2))
         return best
+
+    def ringing_starts(self):
+        """Starting points where the loudest of the output is the sensor's own free motion."""
+        frequency = np.fft.rfftfreq(self.n, 1 / self.rate)
+        taper = np.hanning(self.n)
+        loudness = np.abs(rfft(taper * (self.whole - self.whole.mean())))
+        loudest = frequency[1 + np.argmax(loudness[1:])]
+        grid = self.structure.grid(frequency[1], frequency[-1], loudest)
+        distance = np.abs(grid[:, 0] - np.log(loudest))
+        near = grid[distance < distance.min() + _BESIDE]
+        # half a period away, with the other polarity, looks much the same
+        half = 0.5 * self.rate / loudest
+        delay = phase_delay(self.reference, self.whole) + self.lag_s * self.rate
+        plain, *others = ([np.r_[own, delay + away] for own in near] for away in (0.0, half, -half))
+        others = sorted(sum(others, []), key=lambda theta: self.state(theta).cost)
+        return [*plain, *others[:_HALF_AWAY]]
 
     def starts(self):
         """Most promising starting points: the grid's best, improved on the averaged response."""
@@ -194,7 +235,7 @@ class _Problem:
         prepared = self.structure.prepare(s)
         peak = frequency[np.argmax(np.abs(response))]
         grid = self.structure.grid(frequency[0], frequency[-1], peak)
-        models = self.structure.gradient(prepared, grid.T[:, :, None])[0]
+        models = self.structure.response(prepared, grid.T[:, :, None])
         # the correlation may have peaked half a period of the resonance away from the delay
         energy = weight * np.abs(response)**2
         reach = 0.75 * self.rate * np.sum(energy) / np.sum(energy * frequency) + 2
@@ -241,9 +282,9 @@ class _Problem:
         Besides, their number without the derivatives, the free swing and its pole's derivatives.
         """
         own, delay = theta[:-1], theta[-1] / self.rate - self.lag_s
-        response, slopes = self.structure.gradient(self.prepared, own)
-        spectra = np.array([response, *slopes, response * (-self.convolution.s / self.rate)])
         s = self.convolution.s
+        response, slopes = self.structure.gradient(self.prepared, own)
+        spectra = np.array([response, *slopes, response * self.shift])
         spectra *= _exponential(-s[0] * delay, -(s[1] - s[0]) * delay, len(s))
         simulated = self.convolution.response(spectra)[:, _WAY:][:, self.judged]
         # one that is over long before the first used sample is none
@@ -337,8 +378,13 @@ class _Problem:
         return _State(theta, float(cost), linear, rows, residual, gram, right,
                       swing, real)
 
-    def require_relation(self, explained):
-        if explained < min(_CHANCE / self.independent(), 0.5):
+    def explained(self, state):
+        """Share of the output's power."""
+        return 1 - state.cost / (len(self.sensor) * self.size**2)
+
+    def require_relation(self, state):
+        explained = self.explained(state)
+        if explained < 0.5 and explained < _CHANCE / self.independent():
             raise IdentificationError(
                 "the sensor's output has nothing to do with the reference: the best model explains "
                 f"{max(explained, 0):.2%} of its power, which chance alone can do; were both "
@@ -351,6 +397,25 @@ class _Problem:
         shared = np.abs(rfft(full))**2 * np.abs(rfft(self.reference - self.reference.mean()))**2
         return np.sum(shared)**2 / np.sum(shared**2)
 
+    def curvature(self, own, covariance):
+        """Second-order part of the physical parameters' covariance.
+
+        Mean square of the quadratic terms of Gaussian unknowns with this covariance (JCGM 100:2008,
+        5.1.2, note, has the variances). Where a damping order of about 1 is not well known, the
+        first derivative of the damping ratio by it, which is nought there, tells nothing.
+        """
+        slopes = np.zeros((len(own),) * 3)
+        for place, reach in enumerate(np.sqrt(np.maximum(np.diag(covariance), 0))):
+            ends = np.clip(own + np.outer([1, -1], np.eye(len(own))[place] * reach),
+                           self.low[:-1], self.high[:-1])
+            if ends[0, place] > ends[1, place]:
+                above, below = (self.structure.physical(end)[1] for end in ends)
+                slopes[:, :, place] = (above - below) / (ends[0, place] - ends[1, place])
+        quadratic = 0.5 * (slopes + slopes.transpose(0, 2, 1)) @ covariance
+        mean = np.einsum("ijj->i", quadratic)
+        return (0.5 * np.einsum("ijk,lkj->il", quadratic, quadratic)
+                + 0.25 * np.outer(mean, mean))
+
     def result(self, state, uncertainty=True):
         """The fit in physical units; without `uncertainty` its covariance is NaN."""
         theta, linear, count = state.theta, state.linear, len(state.linear)
@@ -359,7 +424,7 @@ class _Problem:
         covariance = np.full((len(names), len(names)), np.nan)
         held = self.low == self.high
         stuck = ((theta <= self.low) | (theta >= self.high)) & ~held
-        gradient = None
+        gradient, decay = None, np.nan
         if uncertainty:
             jacobian = state.rows.copy()
             # the offset is what remains with the whole reference, not with the part that moves
@@ -384,13 +449,21 @@ class _Problem:
                 within += np.outer(beyond, beyond)
             covariance = np.zeros_like(covariance)
             covariance[np.ix_(free, free)] = within[:len(free), :len(free)]
+            place = slice(1, 1 + len(own))
+            spread = np.linalg.solve(factors, np.linalg.solve(factors, covariance[place, place]).T)
+            covariance[place, place] += self.curvature(theta[:-1], spread)
+            pole, slopes = self.structure.mode(theta[:-1])
+            if pole is not None:
+                variance = slopes.real @ spread @ slopes.real
+                decay = 2 * np.sqrt(max(variance, 0)) - pole.real
         full = np.full(self.n, np.nan)
         full[self.used] = state.residual
         offset = linear[1] - linear[0] * self.level
         values = np.r_[linear[0], own, theta[-1] / self.rate, offset]
         at_bounds = tuple(name for name, here in zip((*self.structure.names, "delay_s"), stuck)
                           if here)
-        return Fit(names, values, covariance, full, theta, at_bounds, gradient)
+        return Fit(names, values, covariance, full, theta, at_bounds, gradient, state.free_share,
+                   float(decay))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -410,6 +483,14 @@ class _State:
     swing: np.ndarray | None
     real: bool
     converged: bool = False
+
+    @property
+    def free_share(self):
+        """Power of the free swing, of the output's; beside a forced one, it may exceed 1."""
+        if self.swing is None:
+            return 0.0
+        measured = self.linear @ self.rows[:len(self.linear)] + self.residual
+        return float(np.var(self.linear[2:4] @ self.rows[2:4]) / np.var(measured))
 
     def reduced(self):
         """Normal matrix and slope of the unknowns, the linear coefficients eliminated."""

@@ -160,10 +160,11 @@ def _without_transitions(tones, moving):
 
 def _straight(phases):
     """Whether phases, shape (..., blocks), lie on straight lines."""
+    # phases of many turns would lose digits
+    phases = phases - phases[..., :1]
     place = np.arange(phases.shape[-1]) - (phases.shape[-1] - 1) / 2
-    rest = (phases - phases.mean(axis=-1, keepdims=True)
-            - (phases @ place / (place @ place))[..., None] * place)
-    return np.max(np.abs(rest), axis=-1) < _STRAIGHT
+    line = np.outer(place, place / (place @ place)) + 1 / len(place)
+    return np.max(np.abs(phases - phases @ line), axis=-1) < _STRAIGHT
 
 
 def _straight_until(phase, first, short):

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 from scipy.signal import lfilter
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtri
 
 from ..errors import FracAccelError
 
@@ -108,7 +108,7 @@ def residual_tests(residual, reference, valid=None, gradient=None):
         At the same instants, without gaps.
     valid : ndarray of bool, shape (n,), optional
         Samples that count.
-    gradient : ndarray, shape (n, p), optional
+    gradient : ndarray, shape (p, n), optional
         Derivatives of the simulated output by the parameters that have been fitted to these very
         data, in any units.
 
@@ -144,17 +144,17 @@ def residual_tests(residual, reference, valid=None, gradient=None):
     weight = pairs[1:LAGS + 1] * (count + 2) / count
     whiteness = float(np.sum(weight * autocorrelation**2 * count / (count - 1)))
     noise = _noise_model(covariance, count)
-    quantile = norm.isf(SIGNIFICANCE / 2)
+    quantile = ndtri(1 - SIGNIFICANCE / 2)
     lags = np.arange(-LAGS, LAGS + 1)
     cross = _cross(error, reference - reference.mean(), used, lags, gradient, noise)
     return ResidualTests(
         lags=np.arange(1, LAGS + 1), autocorrelation=autocorrelation,
         autocorrelation_band=quantile / np.sqrt(weight),
-        whiteness_statistic=whiteness, whiteness_p_value=float(chi2.sf(whiteness, LAGS)),
+        whiteness_statistic=whiteness, whiteness_p_value=float(chdtrc(LAGS, whiteness)),
         reference_lags=lags, reference_correlation=cross.correlation,
         reference_band=quantile * cross.std,
         independence_statistic=cross.statistic,
-        independence_p_value=float(chi2.sf(cross.statistic, cross.freedom))
+        independence_p_value=float(chdtrc(cross.freedom, cross.statistic))
         if cross.freedom else 1.0,
         independence_freedom=cross.freedom, noise_order=len(noise[0]) - 1,
         dependent_share=cross.share)
@@ -213,13 +213,15 @@ def _moments(error, reference, used, lags, gradient, noise):
     """
     n = len(error)
     denominator, variance = noise
-    others = np.ones((n, 1)) if gradient is None else np.c_[np.ones(n), gradient]
-    others = others / np.maximum(np.max(np.abs(others), axis=0), 1e-300)
+    others = np.ones((1, n))
+    if gradient is not None:
+        size = np.maximum(np.max(gradient, axis=1), -np.min(gradient, axis=1))
+        others = np.concatenate([others, gradient / np.maximum(size, 1e-300)[:, None]])
     edges = _edges(used)
     if len(denominator) == 1 and len(edges) == 2:
         gram, right = _white_moments(error, reference, edges, lags, others)
         return gram, variance * gram, right
-    width = len(lags) + others.shape[1]
+    width = len(lags) + len(others)
     gram, coloured, right = np.zeros((width, width)), np.zeros((width, width)), np.zeros(width)
     reach = lags[-1]
     padded = np.r_[np.zeros(reach), reference, np.zeros(reach)]
@@ -228,7 +230,7 @@ def _moments(error, reference, used, lags, gradient, noise):
         start = max(0, stop - _BLOCK)
         columns = np.concatenate(
             [padded[start + reach - lags[:, None] + np.arange(stop - start)].T,
-             others[start:stop]], axis=1)
+             others[:, start:stop].T], axis=1)
         # without the lags that reach out of the record, every column is zero there by padding
         columns *= used[start:stop, None]
         gram += columns.T @ columns
@@ -262,9 +264,9 @@ def _white_moments(error, reference, edges, lags, others):
 
     def shifted(lag):
         return padded[reach - lag + start:reach - lag + stop]
-    rows = np.concatenate([others[start:stop].T, [error[start:stop], shifted(lags[0])]])
+    rows = np.concatenate([others[:, start:stop], [error[start:stop], shifted(lags[0])]])
     across = np.array([rows @ shifted(lag) for lag in lags])
-    gram = np.empty((count + others.shape[1],) * 2)
+    gram = np.empty((count + len(others),) * 2)
     before, last = (padded[reach - lags + place - 1] for place in edges)
     change = np.outer(before, before) - np.outer(last, last)
     gram[0, :count] = gram[:count, 0] = across[:, -1]

@@ -30,13 +30,21 @@ class OscillatorStructure:
         """What the response needs of the complex frequencies `s`, once."""
         return s
 
+    def response(self, s, theta):
+        """Response with unit sensitivity; unknowns as in `gradient`."""
+        square, damper = self._terms(s, theta)
+        return 1 / (square + damper + 1)
+
+    def _terms(self, s, theta):
+        u = s * (np.exp(-theta[0]) / (2 * np.pi))
+        return u * u, 2 * np.exp(theta[1]) * u
+
     def gradient(self, s, theta):
         """Response with unit sensitivity, and its derivatives by the unknowns.
 
         Unknowns of shape (k, ...) broadcast against the frequencies.
         """
-        u = s * np.exp(-theta[0]) / (2 * np.pi)
-        square, damper = u * u, 2 * np.exp(theta[1]) * u
+        square, damper = self._terms(s, theta)
         response = 1 / (square + damper + 1)
         twice = response * response
         return response, [twice * (2 * square + damper), -twice * damper]
@@ -104,6 +112,9 @@ class FractionalStructure(OscillatorStructure):
 
     def prepare(self, s):
         return s, np.log(s)
+
+    def response(self, prepared, theta):
+        return self.gradient(prepared, theta)[0]
 
     def gradient(self, prepared, theta):
         (log_f0, log_zeta, order), factors = _natural(theta)

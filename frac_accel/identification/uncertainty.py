@@ -6,13 +6,16 @@ from scipy.ndimage import uniform_filter1d
 
 # Padding of the spectra, in roots of the record.
 _REACH = 12
+# Share of a band's noise that a residual shows at least.
+_LEAST = 0.05
 
 
 def sandwich(jacobian, residual, used):
     r"""Covariance :math:`(J^T J)^{-1} J^T \Gamma J (J^T J)^{-1}`.
 
     The residual's autocovariance :math:`\Gamma` comes from its smoothed spectrum (L. Ljung, *System
-    Identification*, 2nd ed., equation (9.42)).
+    Identification*, 2nd ed., equation (9.42)), over what the fit to white noise would leave of it:
+    slow columns take most of the lowest frequencies out of the residual.
 
     Parameters
     ----------
@@ -28,28 +31,33 @@ def sandwich(jacobian, residual, used):
     """
     scale = np.linalg.norm(jacobian, axis=0)
     scaled = (jacobian / scale).T
-    full = np.zeros((len(scaled) + 1, len(used)))
-    full[:-1, used] = scaled
-    full[-1, used] = residual
+    rows = np.concatenate([scaled, residual[None]])
+    first, last = np.flatnonzero(used)[[0, -1]]
+    # where the rows begin turns all spectra alike; only gaps need their place
+    if last + 1 - first > len(residual):
+        rows, present = np.zeros((len(rows), len(used))), rows
+        rows[:, used] = present
     # the smoothed spectrum reaches over lags of a few times the root of the record
     length = next_fast_len(len(used) + int(_REACH * np.sqrt(len(used))), real=True)
-    spectra = rfft(full, length, axis=1)
-    power = (spectra[-1].real**2 + spectra[-1].imag**2) / len(residual)
+    spectra = rfft(rows, length, axis=1)
+    power = spectra[-1].real**2 + spectra[-1].imag**2
+    values, vectors = np.linalg.eigh(scaled @ scaled.T)
+    root = vectors / np.sqrt(np.maximum(values, 1e-14 * values[-1]))
+    fitted = root.T @ spectra[:-1]
+    # what a fit to white noise leaves of each line
+    left = len(residual) - np.sum(np.square(fitted.view(float)), axis=0).reshape(-1, 2).sum(axis=1)
     width = max(5, int(len(power) / np.sqrt(len(used))))
-    smooth = uniform_filter1d(power, width, mode="reflect")
+    power, left = (uniform_filter1d(v, width, mode="reflect") for v in (power, left))
+    smooth = power / np.maximum(left, _LEAST * len(residual))
     twice = np.full(len(power), 2.0)
     twice[0] = 1.0
     if length % 2 == 0:
         twice[-1] = 1.0
-    weighted = (spectra[:-1] * np.sqrt(twice * smooth)).view(float)
-    meat = weighted @ weighted.T / length
-    values, vectors = np.linalg.eigh(scaled @ scaled.T)
-    bread = (vectors / np.maximum(values, 1e-14 * values[-1])) @ vectors.T
+    weighted = (fitted * np.sqrt(twice * smooth)).view(float)
     # as a square, so that rounding makes no variance negative
-    strengths, directions = np.linalg.eigh(meat)
-    root = bread @ (directions * np.sqrt(np.maximum(strengths, 0))) / scale[:, None]
-    freedom = len(residual) / max(len(residual) - len(scaled), 1)
-    return freedom * root @ root.T
+    strengths, directions = np.linalg.eigh(weighted @ weighted.T / length)
+    root = root @ (directions * np.sqrt(np.maximum(strengths, 0))) / scale[:, None]
+    return root @ root.T
 
 
 def white_noise(residual):
