@@ -5,10 +5,12 @@ import pytest
 import rig
 
 from frac_accel import identify
+from frac_accel.core import Oscillator
 from frac_accel.identification.output_error import fit_output_error
 from frac_accel.identification.structures import FractionalStructure
 from frac_accel.pair import make_pair
 from frac_accel.samples import Samples
+from frac_accel.uncertainty import response_uncertainty
 
 pytestmark = pytest.mark.long
 
@@ -37,6 +39,28 @@ def test_order_is_found_and_covered(noise_ar):
     assert np.median(errors) < 0.01
     # 48 correlated trials of 0.95, of which at least 12 are independent: the 1 % limit
     assert np.mean(np.abs(scores) < 1.96) > 0.8
+
+
+def test_response_is_known_where_its_parameters_are_not():
+    """Beyond the band, frequency and damping replace one another; within, the response is plain."""
+    rng = np.random.default_rng(30265)
+    at_hz = np.array([50.0, 100.0, 200.0])
+    s = 2j * np.pi * at_hz
+    for _ in range(4):
+        core = {"type": "oscillator", "natural_frequency_hz": rng.uniform(600, 750),
+                "damping_ratio": rng.uniform(0.5, 0.8), "damping_order": 1.0, "sensitivity": 1.0}
+        excitation = rig.band_noise(rng, RATE_HZ, 3.0, (5.0, 400.0), (1.0, 0.0, 0.0), lead_s=0.2)
+        record = rig.simulate_record(rig.Sensor(core, {}), excitation, rng, snr_db=20.0)
+        pair = make_pair(Samples.of(record.stamps_ns, record.reference),
+                         Samples.of(record.sensor_stamps_ns, record.sensor))
+        result = identify(pair, structure="fractional")
+        frequency = result.parameters["natural_frequency_hz"]
+        assert frequency["std"] > 0.03 * frequency["value"]
+        found = response_uncertainty(result.model, at_hz)
+        truth = np.abs(Oscillator(core["natural_frequency_hz"],
+                                  core["damping_ratio"]).transfer_function(s))
+        assert np.all(found.amplitude_std < 0.01)
+        assert np.all(np.abs(found.amplitude - truth) < 4 * found.amplitude_std)
 
 
 def test_search_does_not_end_in_the_valley():

@@ -115,6 +115,7 @@ def test_bags_are_small_and_hold_the_bench(bench):
     assert bench["classical"].frequency_hz == pytest.approx(paper_records.bench.SINES_HZ, abs=0.01)
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")  # a covariance that is none
 @pytest.mark.parametrize("seed", range(3))
 def test_random_sensors_of_the_independent_simulator(seed):
     """What the bags show holds for sensors that were never looked at."""

@@ -73,6 +73,9 @@ class Fit:
         Power of the free swing that began before the record, of the output's.
     fastest_decay : float
         Rate of the free swing's decay [1/s], two standard uncertainties added; NaN without one.
+    second_order : ndarray, shape (p,), or 0
+        What the parameters' variances have beyond the covariance, which is linear: so the response,
+        which may be known far better than each of them, can be propagated from it.
     """
 
     names: tuple
@@ -84,11 +87,12 @@ class Fit:
     gradient: np.ndarray | None
     free_share: float
     fastest_decay: float
+    second_order: np.ndarray | float = dataclasses.field(default=0.0, kw_only=True)
 
     @property
     def std(self):
         """Standard uncertainties, shape (p,)."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0))
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0) + self.second_order)
 
     @property
     def rmse(self):
@@ -397,8 +401,8 @@ class _Problem:
         shared = np.abs(rfft(full))**2 * np.abs(rfft(self.reference - self.reference.mean()))**2
         return np.sum(shared)**2 / np.sum(shared**2)
 
-    def curvature(self, own, covariance):
-        """Second-order part of the physical parameters' covariance.
+    def second_order(self, own, covariance):
+        """Second-order part of the variances of the physical parameters, shape (p,).
 
         Mean square of the quadratic terms of Gaussian unknowns with this covariance (JCGM 100:2008,
         5.1.2, note, has the variances). Where a damping order of about 1 is not well known, the
@@ -412,9 +416,8 @@ class _Problem:
                 above, below = (self.structure.physical(end)[1] for end in ends)
                 slopes[:, :, place] = (above - below) / (ends[0, place] - ends[1, place])
         quadratic = 0.5 * (slopes + slopes.transpose(0, 2, 1)) @ covariance
-        mean = np.einsum("ijj->i", quadratic)
-        return (0.5 * np.einsum("ijk,lkj->il", quadratic, quadratic)
-                + 0.25 * np.outer(mean, mean))
+        return (0.5 * np.einsum("ijk,ikj->i", quadratic, quadratic)
+                + 0.25 * np.einsum("ijj->i", quadratic)**2)
 
     def result(self, state, uncertainty=True):
         """The fit in physical units; without `uncertainty` its covariance is NaN."""
@@ -424,7 +427,7 @@ class _Problem:
         covariance = np.full((len(names), len(names)), np.nan)
         held = self.low == self.high
         stuck = ((theta <= self.low) | (theta >= self.high)) & ~held
-        gradient, decay = None, np.nan
+        gradient, decay, second_order = None, np.nan, 0.0
         if uncertainty:
             jacobian = state.rows.copy()
             # the offset is what remains with the whole reference, not with the part that moves
@@ -451,7 +454,8 @@ class _Problem:
             covariance[np.ix_(free, free)] = within[:len(free), :len(free)]
             place = slice(1, 1 + len(own))
             spread = np.linalg.solve(factors, np.linalg.solve(factors, covariance[place, place]).T)
-            covariance[place, place] += self.curvature(theta[:-1], spread)
+            second_order = np.zeros(len(names))
+            second_order[place] = self.second_order(theta[:-1], spread)
             pole, slopes = self.structure.mode(theta[:-1])
             if pole is not None:
                 variance = slopes.real @ spread @ slopes.real
@@ -463,7 +467,7 @@ class _Problem:
         at_bounds = tuple(name for name, here in zip((*self.structure.names, "delay_s"), stuck)
                           if here)
         return Fit(names, values, covariance, full, theta, at_bounds, gradient, state.free_share,
-                   float(decay))
+                   float(decay), second_order=second_order)
 
 
 @dataclasses.dataclass(frozen=True)
