@@ -285,6 +285,16 @@ def test_band_is_judged_by_the_gain_where_the_model_was_identified():
         assert design_inverse(SensorModel.from_dict(data), 1000.0).axes[0].band_hz[1] < 1.0
 
 
+def test_what_was_not_identified_is_called_extrapolated():
+    data = {"schema": "frac_accel/sensor_model/1",
+            "core": {"type": "oscillator", "natural_frequency_hz": 150.0, "damping_ratio": 0.3,
+                     "sensitivity": 1.0}}
+    assert design_inverse(SensorModel.from_dict(data), 1000.0).extrapolated_below_hz == 0
+    known = SensorModel.from_dict({**data, "band_hz": [20.0, 200.0]})
+    assert design_inverse(known, 1000.0).extrapolated_below_hz == 20.0
+    assert design_inverse(known, 1000.0, lowest_hz=21.0).extrapolated_below_hz == 0
+
+
 def test_plateau_of_an_oscillator_is_its_sensitivity_in_any_band():
     for sensitivity in (-0.3, 2.0):
         model = SensorModel.from_dict({

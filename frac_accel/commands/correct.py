@@ -81,6 +81,9 @@ def run(arguments):
         print(f"  {axis}: {low:.4g} to {high:.4g} Hz, worst error "
               f"{design['worst_amplitude_error']:.2%} and {design['worst_phase_error_deg']:.3f} "
               f"deg, noise gain {design['noise_gain']:.3g}")
+    if corrector.design.extrapolated_below_hz:
+        print("  below {:.4g} Hz by extrapolation: the model was identified from {:.4g} to {:.4g} "
+              "Hz".format(corrector.design.extrapolated_below_hz, *corrector.model.band_hz))
     print(f"  filter delay {summary['filter_delay_s']:.4g} s; sensor's own delay "
           f"{summary['sensor_delay_s']:.4g} s, taken out of the stamps")
     write_json(arguments.json, {"output": str(arguments.output), "counters": counters,

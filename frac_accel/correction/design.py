@@ -63,10 +63,21 @@ class FilterDesign:
         linear = max(axis.filter.lead + len(axis.filter.taps) for axis in self.axes) - 1
         return max(linear, *(terms.warm_up_samples for terms in self.static_terms if terms), 0)
 
+    @property
+    def extrapolated_below_hz(self):
+        """Where the band in which the model was identified begins, if the filters reach below it.
+
+        A sensor's plateau is physical, and gravity and the offset need it, but it was not measured.
+        """
+        known = self.model.band_hz
+        lowest = min(axis.band_hz[0] for axis in self.axes)
+        return known[0] if known and lowest < known[0] else 0.0
+
     def summary(self):
         """Plain numbers of the design, for reports and diagnostics."""
         return {
             "sampling_rate_hz": self.sampling_rate_hz,
+            "extrapolated_below_hz": self.extrapolated_below_hz,
             "filter_delay_s": self.delay_samples / self.sampling_rate_hz,
             "sensor_delay_s": self.sensor_delay_ns * 1e-9,
             "warm_up_s": self.warm_up_samples / self.sampling_rate_hz,
