@@ -17,6 +17,7 @@ from ..simulation import AxisSimulator
 # Samples at both ends that the band-limited simulation cannot know.
 _EDGE = 64
 _ITERATIONS = 12
+_TRIES = 6
 _STEP = 1e-3
 # Steps of a nonlinear core in each sampling interval: for the output (wrong by at most 3e-4 of what
 # the cause adds, where measured) and for its derivatives (ten times that, which bends no fit).
@@ -301,26 +302,26 @@ class Problem:
         return self._improved(Fitted(self, point, unknowns, theta, rough=rough), iterations,
                               hopeless)
 
-    def finished(self, fit):
+    def finished(self, fit, hopeless=np.inf):
         """A rough fit with the steps and iterations that it was spared."""
         finer = Fitted(self, self._point(fit.effects, False), fit.unknowns, fit.theta)
         finer.jacobian = fit.jacobian
-        return self._improved(finer)
+        return self._improved(finer, hopeless=hopeless)
 
     def _improved(self, here, iterations=_ITERATIONS, hopeless=np.inf):
         """A fit with more iterations."""
         damping, here.settled = 0.0, not here.unknowns
+        low, high = np.array([(u.low, u.high) for u in here.unknowns]).reshape(-1, 2).T
         for _ in range(iterations if here.unknowns else 0):
             gram, slope = here.jacobian.T @ here.jacobian, here.jacobian.T @ here.residual
             small = _SMALL_GAIN * here.cost / self.count
             there = None
-            for _ in range(8):
-                step = _solve(gram + damping * np.diag(np.diag(gram)), slope)
+            for _ in range(_TRIES):
+                step = _step(gram, slope, damping, here.theta <= low, here.theta >= high)
                 if step @ slope < small:
                     here.settled = damping < 1e-2
                     break
-                theta = np.array([np.clip(value + np.clip(change, -1, 1), u.low, u.high)
-                                  for value, change, u in zip(here.theta, step, here.unknowns)])
+                theta = np.clip(here.theta + np.clip(step, -1, 1), low, high)
                 try:
                     there = self._point(self.replaced(here.effects, here.unknowns, theta),
                                         here.rough)
@@ -328,13 +329,18 @@ class Problem:
                     there = None
                 if there is not None and there.cost < here.cost:
                     break
-                there, damping = None, max(5 * damping, 1e-3)
+                there, damping = None, max(10 * damping, 1e-3)
             if there is None:
                 break
-            gained = here.cost - there.cost
+            gained, went = here.cost - there.cost, theta - here.theta
+            kept = gained / (2 * went @ slope - went @ gram @ went)
             here = Fitted(self, there, here.unknowns, theta, gained < small and damping < 1e-2,
                           here.rough)
-            damping = damping / 10 if damping > 1e-6 else 0.0
+            # where the parabola promises too much, a longer step would only be refused
+            if kept > 0.75:
+                damping = damping / 10 if damping > 1e-6 else 0.0
+            elif kept < 0.25:
+                damping = max(2 * damping, 1e-3)
             if gained < (here.cost if here.cost > hopeless else small):
                 break
         return here
@@ -453,6 +459,20 @@ def _to_theta(value, unknown):
 
 def _from_theta(value, unknown):
     return float(np.exp(value)) if unknown.logarithmic else float(value * unknown.scale)
+
+
+def _step(gram, slope, damping, at_low, at_high):
+    """Step of the damped least squares; what would leave its bounds stays where it is."""
+    free = np.ones(len(slope), bool)
+    while True:
+        step = np.zeros(len(slope))
+        if free.any():
+            part = gram[np.ix_(free, free)]
+            step[free] = _solve(part + damping * np.diag(np.diag(part)), slope[free])
+        beyond = (at_low & (step < 0)) | (at_high & (step > 0))
+        if not beyond.any():
+            return step
+        free &= ~beyond
 
 
 def _solve(matrix, right):

@@ -15,9 +15,11 @@ _MOST = 4
 # A third cause that takes away less of what is left, and leaves more than noise, ends the search:
 # causes are being added up to imitate one that is not known.
 _STUCK = 0.2
-# Iterations of a first trial, and the cost over the best one's with which it ends there.
+# Iterations of a first trial, the cost over the best one's with which it ends there, and that with
+# which it goes on only as long as each iteration halves it.
 _TRIAL = 4
 _HOPELESS = 4.0
+_BEHIND = 2.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,9 +72,10 @@ class Search:
             except FracAccelError:
                 continue  # a motion without bound describes no record
             best = min(best, trials[key].cost)
-        for key, trial in trials.items():
+        for key, trial in sorted(trials.items(), key=lambda entry: entry[1].cost):
             if trial.rough and trial.cost <= _HOPELESS * best:
-                trial = self.problem.finished(trial)
+                trial = self.problem.finished(trial, _BEHIND * best)
+                best = min(best, trial.cost)
             if trial is not self.fits.get(key):
                 self._keep(trial)
         return sorted((self.fits[key] for key in trials), key=lambda fit: fit.cost)
