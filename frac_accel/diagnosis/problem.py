@@ -16,6 +16,7 @@ from ..simulation import AxisSimulator
 
 # Samples at both ends that the band-limited simulation cannot know.
 _EDGE = 64
+# Iterations of a fit, and steps that are tried in each.
 _ITERATIONS = 12
 _TRIES = 6
 _STEP = 1e-3
