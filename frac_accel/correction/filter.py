@@ -13,7 +13,7 @@ _HISTORY_PIECE = 128
 # Error of a filter in series, of its response, from which on it is not used.
 _ROUNDING = 1e-6
 # Poles closer to one than this do not run in series with others.
-_SLOWEST_IN_CHAIN = 3e-7
+_SLOWEST_IN_CHAIN = 1e-6
 # lfilter convolves a pure FIR by another, length-dependent route: a zero keeps it away.
 _FIR = np.array([1.0, 0.0])
 
