@@ -18,12 +18,8 @@ def bulk_delay(reference, sensor):
     n = len(reference)
     # room for the lags that are looked at
     length = next_fast_len(n + n // 4 + 1, real=True)
-    shared = irfft(np.conj(rfft(reference - reference.mean(), length))
-                   * rfft(sensor - sensor.mean(), length), length)
-    shared = np.abs(shared)
-    most = n // 4
-    later, earlier = int(np.argmax(shared[:most])), int(np.argmax(shared[-most:])) - most
-    return later if shared[later] >= shared[earlier] else earlier
+    return _largest(np.conj(rfft(reference - reference.mean(), length))
+                    * rfft(sensor - sensor.mean(), length), length, n // 4)
 
 
 def phase_delay(reference, sensor):
@@ -39,8 +35,12 @@ def phase_delay(reference, sensor):
                       for values in (reference, sensor))
     power = np.abs(moving)**2
     shared = np.where(power > _EXCITED * power.max(), np.conj(moving) * answer, 0.0)
-    shared = np.abs(irfft(shared / np.maximum(np.abs(shared), 1e-300), length))
-    most = n // 4
+    return _largest(shared / np.maximum(np.abs(shared), 1e-300), length, n // 4)
+
+
+def _largest(spectrum, length, most):
+    """Lag at which the correlation with this spectrum is largest, either way."""
+    shared = np.abs(irfft(spectrum, length))
     later, earlier = int(np.argmax(shared[:most])), int(np.argmax(shared[-most:])) - most
     return later if shared[later] >= shared[earlier] else earlier
 
