@@ -1,5 +1,7 @@
 """Simulation of a sensor model from a sampled reference."""
 
+import functools
+
 import numpy as np
 
 from .convolution import Convolution, at_positions
@@ -124,6 +126,7 @@ class AxisSimulator:
         self._start_time_s = start_time_s
         self._least_steps = steps_per_sample
         self._convolution, self._room_s = None, 0.0
+        self._transfers, self._motions = {}, {}
         self.circumstances = Circumstances(start_time_s + np.arange(self._n) / self._rate,
                                            _temperature(temperature_c, self._n))
 
@@ -164,9 +167,9 @@ class AxisSimulator:
         if self._still:
             return np.full(self._n, level)
         convolution = self._prepared(delay_s)
-        transfer = model.transfer_function(convolution.s)
+        transfer = self._transfer(model.dynamics)
         if delay_s:
-            transfer *= np.exp(-convolution.s * delay_s)
+            transfer = transfer * kept(self._transfers, delay_s, _shift, convolution.s, delay_s)
         if ratio == 1:
             return convolution.response(transfer) + level
         position = ratio * np.arange(self._n)
@@ -188,19 +191,16 @@ class AxisSimulator:
         steps = int(np.ceil(min(wanted, _MOST_STEPS_PER_SAMPLE)))
         position = ratio * np.arange(self._n) - delay_s * self._rate
         count = int(max(position[-1], self._n)) + _BEYOND
-        convolution = self._prepared(delay_s)
-        links = [effect for effect in model.dynamics[1:] if effect.stage < CORE]
-        transfer = _product([core, *links], convolution.s)
+        self._prepared(delay_s)
+        links = (core, *(effect for effect in model.dynamics[1:] if effect.stage < CORE))
         load = self._level * core.sensitivity
-        motion = []
-        for _ in range(nonlinear_motion.derivatives_needed(force) + 1):
-            motion.append(convolution.response_between(transfer, steps, steps * count))
-            transfer = transfer * (convolution.s / natural)
-        motion[0] += load
+        orders = nonlinear_motion.derivatives_needed(force) + 1
+        wanted = links, natural, orders, steps, count
+        motion = kept(self._motions, wanted, self._core_motion, *wanted, most=1)
         modes = modes_of(core, self._rate / count, natural + np.pi * self._rate * steps)
         start = force.equilibrium(load) - load
         deviation = nonlinear_motion.deviation(
-            modes, force, natural / (self._rate * steps), np.array(motion), start)
+            modes, force, natural / (self._rate * steps), motion, start)
         if not np.isfinite(deviation[-1]):
             raise FracAccelError("the model's motion grows without bound: its nonlinear terms are "
                                  "too large for this record")
@@ -218,12 +218,43 @@ class AxisSimulator:
             moving = moving[:steps * self._n:steps]
         return gain[0].real * (moving + start)
 
+    def _core_motion(self, links, natural, orders, steps, count):
+        """Linear motion and its derivatives by the time natural * t, shape (orders, n)."""
+        convolution, transfer = self._convolution, self._transfer(links)
+        motion = np.empty((orders, steps * count))
+        for order in range(orders):
+            motion[order] = convolution.response_between(transfer, steps, steps * count)
+            transfer = transfer * (convolution.s / natural)
+        motion[0] += self._level * links[0].sensitivity
+        return motion
+
+    def _transfer(self, links):
+        """Composite transfer function of some links, a core first, where the convolution is."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return functools.reduce(np.multiply, [
+                kept(self._transfers, link, link.transfer_function, self._convolution.s)
+                for link in links])
+
     def _prepared(self, delay_s):
         """Convolution with room for a delay."""
         if self._convolution is None or abs(delay_s) > self._room_s:
+            self._transfers, self._motions = {}, {}
             self._room_s = max(abs(delay_s), 64 / self._rate)
             self._convolution = Convolution(self._moving, self._rate, self._room_s)
         return self._convolution
+
+
+def kept(store, key, make, *arguments, most=8):
+    """What `make` returns, from the dict `store` if it is there; the last few made stay there."""
+    if key not in store:
+        while len(store) >= most:
+            del store[next(iter(store))]
+        store[key] = make(*arguments)
+    return store[key]
+
+
+def _shift(s, delay_s):
+    return np.exp(-s * delay_s)
 
 
 def static_gain(model):

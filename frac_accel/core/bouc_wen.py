@@ -26,8 +26,9 @@ def follow_one_way(z, change, beta, gamma):
         if abs(x) > 0.05:
             saturation = -math.expm1(x) / k
         else:  # its series, far faster
-            saturation = change * (1 + x * (1 / 2 + x * (1 / 6 + x * (
-                1 / 24 + x * (1 / 120 + x * (1 / 720))))))
+            square = x * x
+            saturation = change * (1 + x * (1 / 2) + square * (
+                1 / 6 + x * (1 / 24) + square * (1 / 120 + x * (1 / 720))))
         end = z + (1 - k * z) * saturation
         if z * change >= 0 or end * z > 0:
             return end

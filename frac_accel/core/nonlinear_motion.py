@@ -110,7 +110,9 @@ def _prepare_mode(j, length, pole, residue, rows, gains, sums):
         part = 0.5 * (i + 1)
         m0, m1, m2, decay = _moments(pole * part * length)
         scale = residue * part * length
-        g0, g1, g2 = scale * m0, scale * part * m1, scale * part * part * m2
+        g1, g2 = scale * part * m1, scale * part * part * m2
+        # of the parabola's coefficients, then of its values at the start, the middle and the end
+        g0, g1, g2 = scale * m0 - 3 * g1 + 2 * g2, 4 * (g1 - g2), 2 * g2 - g1
         for p in range(3):
             rows[6 * i + 2 * p, j], rows[6 * i + 2 * p + 1, j] = decay.real, decay.imag
             sums[i, p, 0] += g0.real
@@ -128,8 +130,8 @@ def _prepare(length, poles, residues, pairs, rows, gains, sums):
     """All about a step that depends only on its length.
 
     rows (12, m): what d, d' and d'' in the middle, then at the end, see of each state, real and
-    imaginary part; sums (2, 3, 3): and of the three coefficients of the parabola; gains (6, m):
-    change of each state by these, real and imaginary part.
+    imaginary part; sums (2, 3, 3): and of the force at the start, in the middle and at the end;
+    gains (6, m): change of each state by these, real and imaginary part.
     """
     sums[:] = 0.0
     for j in range(pairs):
@@ -138,7 +140,7 @@ def _prepare(length, poles, residues, pairs, rows, gains, sums):
         _prepare_mode(j, length, poles[j].real, residues[j].real, rows, gains, sums)
 
 
-@_fast
+@_inlined
 def _seen(rows, row, real, imaginary, pairs):
     """Real part of the sum of the states, each times its factor in a row (and the next)."""
     total = 0.0
@@ -149,17 +151,17 @@ def _seen(rows, row, real, imaginary, pairs):
     return total
 
 
-@_fast
-def _advance(rows, gains, real, imaginary, pairs, n0, n1, n2):
-    """Move the states to the end of a step with the parabola n0 + n1 x + n2 x**2."""
+@_inlined
+def _advance(rows, gains, real, imaginary, pairs, n0, nm, ne):
+    """Move the states to the end of a step with the parabola through n0, nm and ne."""
     for j in range(pairs):
         before = real[j]
         real[j] = (rows[6, j] * before - rows[7, j] * imaginary[j]
-                   - (gains[0, j] * n0 + gains[2, j] * n1 + gains[4, j] * n2))
+                   - (gains[0, j] * n0 + gains[2, j] * nm + gains[4, j] * ne))
         imaginary[j] = (rows[6, j] * imaginary[j] + rows[7, j] * before
-                        - (gains[1, j] * n0 + gains[3, j] * n1 + gains[5, j] * n2))
+                        - (gains[1, j] * n0 + gains[3, j] * nm + gains[5, j] * ne))
     for j in range(pairs, len(real)):
-        real[j] = rows[6, j] * real[j] - (gains[0, j] * n0 + gains[2, j] * n1 + gains[4, j] * n2)
+        real[j] = rows[6, j] * real[j] - (gains[0, j] * n0 + gains[2, j] * nm + gains[4, j] * ne)
 
 
 @_exact
@@ -170,9 +172,9 @@ def _add(real, imaginary, share, states):
 
 
 @_inlined
-def _parabola(n0, nm, ne):
-    """Coefficients of the parabola through values at 0, 1/2 and 1."""
-    return n0, -3 * n0 + 4 * nm - ne, 2 * n0 - 4 * nm + 2 * ne
+def _parabola(n0, nm, ne, x):
+    """Value at x of the parabola through n0, nm and ne at 0, 1/2 and 1."""
+    return n0 + x * (4 * nm - 3 * n0 - ne + x * (2 * n0 - 4 * nm + 2 * ne))
 
 
 @_inlined
@@ -212,10 +214,16 @@ def _follow(z, q0, v0, q1, v1, duration, beta, gamma):
 
 
 @_inlined
-def _motion(free, sums, i, order, p0, p1, p2):
+def _motion(free, sums, i, order, n0, nm, ne):
     """Derivative of the output in the middle (i = 0) or at the end (1) of a step."""
-    return free[i, order] - (p0 * sums[i, order, 0] + p1 * sums[i, order, 1]
-                             + p2 * sums[i, order, 2])
+    return (free[i, order] - n0 * sums[i, order, 0]
+            - (nm * sums[i, order, 1] + ne * sums[i, order, 2]))
+
+
+@_inlined
+def _beyond(n0, nm, ne):
+    """Middle and end of the next step of the same length, if the parabola goes on."""
+    return n0 - 3 * nm + 3 * ne, 3 * n0 - 8 * nm + 6 * ne
 
 
 @_inlined
@@ -226,22 +234,28 @@ def _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameter
     z0: force and motion at the start; nm, ne: a guess.
     """
     strength, beta, gamma = parameters[1], parameters[2], parameters[3]
-    zm, ze = z0, z0
+    zm, ze, before = z0, z0, 0.0
     for _ in range(_PASSES):
-        p0, p1, p2 = _parabola(n0, nm, ne)
-        qm = _motion(free, sums, 0, 0, p0, p1, p2)
-        qe = _motion(free, sums, 1, 0, p0, p1, p2)
+        qm = _motion(free, sums, 0, 0, n0, nm, ne)
+        qe = _motion(free, sums, 1, 0, n0, nm, ne)
         if strength != 0:
-            vm = _motion(free, sums, 0, 1, p0, p1, p2)
-            ve = _motion(free, sums, 1, 1, p0, p1, p2)
-            zm = _follow(z0, q0, v0, qm, vm, length / 2, beta, gamma)
-            ze = _follow(zm, qm, vm, qe, ve, length / 2, beta, gamma)
+            vm = _motion(free, sums, 0, 1, n0, nm, ne)
+            ve = _motion(free, sums, 1, 1, n0, nm, ne)
+            if v0 * vm >= 0 and vm * ve >= 0:
+                zm = _follow_one_way(z0, qm - q0, beta, gamma)
+                ze = _follow_one_way(z0, qe - q0, beta, gamma)
+            else:
+                zm = _follow(z0, q0, v0, qm, vm, length / 2, beta, gamma)
+                ze = _follow(zm, qm, vm, qe, ve, length / 2, beta, gamma)
         newm = _power_terms(terms, qm) + strength * zm + friction
         newe = _power_terms(terms, qe) + strength * ze + friction
         change = abs(newm - nm) + abs(newe - ne)
         nm, ne = newm, newe
-        if change <= _CONVERGED * (abs(n0) + abs(nm) + abs(ne)):
+        enough = _CONVERGED * (abs(n0) + abs(nm) + abs(ne))
+        # changes shrink by a constant factor: what the next one would be
+        if change <= enough or change * change <= enough * before:
             break
+        before = change
     return nm, ne, ze
 
 
@@ -251,24 +265,23 @@ def _stick(free, sums, n0, mass):
     matrix = np.empty((2, 2))
     right = np.empty(2)
     for i in range(2):
-        s0, s1, s2 = sums[i, 2, 0], sums[i, 2, 1], sums[i, 2, 2]
-        matrix[i, 0], matrix[i, 1] = 4 * s1 - 4 * s2, 2 * s2 - s1
+        matrix[i, 0], matrix[i, 1] = sums[i, 2, 1], sums[i, 2, 2]
         matrix[i, i] += 1 / mass
-        right[i] = free[i, 2] - n0 * (s0 - 3 * s1 + 2 * s2)
+        right[i] = free[i, 2] - n0 * sums[i, 2, 0]
     determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
     return ((right[0] * matrix[1, 1] - right[1] * matrix[0, 1]) / determinant,
             (right[1] * matrix[0, 0] - right[0] * matrix[1, 0]) / determinant)
 
 
 @_exact
-def _crossing(p0, p1, p2, level):
+def _crossing(n0, nm, ne, level):
     """First part of the step at which a parabola leaves the range from -level to level."""
     low, high = 0.0, 1.0
-    if abs(p0 + p1 / 2 + p2 / 4) > level:
+    if abs(nm) > level:
         high = 0.5
     for _ in range(45):
         x = (low + high) / 2
-        if abs(p0 + x * (p1 + x * p2)) > level:
+        if abs(_parabola(n0, nm, ne, x)) > level:
             high = x
         else:
             low = x
@@ -278,13 +291,12 @@ def _crossing(p0, p1, p2, level):
 @_exact
 def _crossing_zero(v0, vm, ve, slip):
     """First part of the step at which the parabola through v0, vm, ve turns against `slip`."""
-    p0, p1, p2 = _parabola(v0, vm, ve)
     low, high = 0.0, 1.0
     if vm * slip < 0:
         high = 0.5
     for _ in range(30):
         x = (low + high) / 2
-        if (p0 + x * (p1 + x * p2)) * slip < 0:
+        if _parabola(v0, vm, ve, x) * slip < 0:
             high = x
         else:
             low = x
@@ -321,7 +333,7 @@ def _start(poles, now, real, imaginary, start, of_displacement):
     _add(real, imaginary, start, of_displacement)
 
 
-@_exact
+@_fast
 def _integrate(poles, residues, of_displacement, pairs, terms, parameters, step, motion, middles,
                start):
     m = len(poles)
@@ -335,24 +347,24 @@ def _integrate(poles, residues, of_displacement, pairs, terms, parameters, step,
     result = np.full(motion.shape[1], np.nan)
     result[0] = start
     q0, v0, z = motion[0, 0] + start, motion[1, 0] if orders > 1 else 0.0, 0.0
-    n0, p1, p2 = _power_terms(terms, q0), 0.0, 0.0
+    n0 = _power_terms(terms, q0)
+    nm, ne = n0, n0
     for index in range(motion.shape[1] - 1):
         _look(rows, real, imaginary, pairs, motion, middles, index, orders, free)
-        nm, ne, z = _slip(free, sums, step, n0, q0, v0, z, n0 + 1.5 * p1 + 2.25 * p2,
-                          n0 + 2 * p1 + 4 * p2, 0.0, terms, parameters)
-        p0, p1, p2 = _parabola(n0, nm, ne)
-        q0 = _motion(free, sums, 1, 0, p0, p1, p2)
-        if orders > 1:
-            v0 = _motion(free, sums, 1, 1, p0, p1, p2)
-        _advance(rows, gains, real, imaginary, pairs, p0, p1, p2)
+        nextm, nexte = _beyond(n0, nm, ne)
         n0 = ne
+        nm, ne, z = _slip(free, sums, step, n0, q0, v0, z, nextm, nexte, 0.0, terms, parameters)
+        q0 = _motion(free, sums, 1, 0, n0, nm, ne)
+        if orders > 1:
+            v0 = _motion(free, sums, 1, 1, n0, nm, ne)
+        _advance(rows, gains, real, imaginary, pairs, n0, nm, ne)
         if not np.isfinite(q0):
             break
         result[index + 1] = q0 - motion[0, index + 1]
     return result
 
 
-@_exact
+@_fast
 def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pairs, mass, terms,
                              parameters, step, motion, middles, start):
     m = len(poles)
@@ -372,7 +384,7 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
     n0 = _power_terms(terms, q0) + level * slip
     if sticks:
         n0 = mass * (motion[2, 0] + _seen(now, 4, real, imaginary, pairs))
-    p0, p1, p2 = n0, 0.0, 0.0
+    last, nm, ne = n0, n0, n0  # force in the last step
     for index in range(motion.shape[1] - 1):
         position = 0.0
         for split in range(_SPLITS):
@@ -390,36 +402,34 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
             changes = False
             if sticks:
                 nm, ne = _stick(free, s, n0, mass)
-                p0, p1, p2 = _parabola(n0, nm, ne)
                 changes = abs(nm - smooth) > level or abs(ne - smooth) > level
                 if changes:
-                    share = _crossing(p0 - smooth, p1, p2, level)
+                    share = _crossing(n0 - smooth, nm - smooth, ne - smooth, level)
                     left *= share
-                    p1, p2 = p1 * share, p2 * share * share
+                    nm, ne = _parabola(n0, nm, ne, share / 2), _parabola(n0, nm, ne, share)
                     r, g, s = part_rows, part_gains, part_sums
                     _prepare(step * left, poles, residues, pairs, r, g, s)
                 end = (motion[0, index + 1], motion[1, index + 1])
                 if changes or position > 0:
                     end = (_at(motion, 0, index, position + left),
                            _at(motion, 1, index, position + left))
-                _advance(r, g, real, imaginary, pairs, p0, p1, p2)
+                _advance(r, g, real, imaginary, pairs, n0, nm, ne)
                 _add(real, imaginary, q0 - end[0] - _seen(now, 0, real, imaginary, pairs),
                      of_displacement)
                 _add(real, imaginary, -end[1] - _seen(now, 2, real, imaginary, pairs), of_velocity)
-                n0 = p0 + p1 + p2
+                last, n0 = n0, ne
                 if changes:
                     sticks, slip = False, np.sign(n0 - smooth)
                     n0 = smooth + level * slip
-                    p0, p1, p2 = n0, 0.0, 0.0
+                    last, nm, ne = n0, n0, n0
             else:
                 friction = level * slip
                 z0 = z
-                nm, ne, z = _slip(free, s, step * left, n0, q0, v0, z0,
-                                  p0 + 1.5 * p1 + 2.25 * p2, p0 + 2 * p1 + 4 * p2, friction, terms,
-                                  parameters)
-                p0, p1, p2 = _parabola(n0, nm, ne)
-                vm = _motion(free, s, 0, 1, p0, p1, p2)
-                ve = _motion(free, s, 1, 1, p0, p1, p2)
+                nextm, nexte = _beyond(last, nm, ne)
+                nm, ne, z = _slip(free, s, step * left, n0, q0, v0, z0, nextm, nexte, friction,
+                                  terms, parameters)
+                vm = _motion(free, s, 0, 1, n0, nm, ne)
+                ve = _motion(free, s, 1, 1, n0, nm, ne)
                 changes = (vm * slip < 0 or ve * slip < 0) and split < _SPLITS - 1
                 if changes:
                     # the part of the step after which the velocity is zero
@@ -433,17 +443,16 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                                       free)
                         nm, ne, z = _slip(free, s, step * left, n0, q0, v0, z0, n0, n0,
                                           friction, terms, parameters)
-                        p0, p1, p2 = _parabola(n0, nm, ne)
-                        vm = _motion(free, s, 0, 1, p0, p1, p2)
-                        ve = _motion(free, s, 1, 1, p0, p1, p2)
+                        vm = _motion(free, s, 0, 1, n0, nm, ne)
+                        ve = _motion(free, s, 1, 1, n0, nm, ne)
                         slope = (v0 - 4 * vm + 3 * ve) / share
                         if slope * slip >= 0 or abs(ve) <= _TURNED * abs(slope):
                             break
                         share = min(max(share - ve / slope, 0.1 * share), 1.0)
-                q0 = _motion(free, s, 1, 0, p0, p1, p2)
+                q0 = _motion(free, s, 1, 0, n0, nm, ne)
                 v0 = ve
-                _advance(r, g, real, imaginary, pairs, p0, p1, p2)
-                n0 = ne
+                _advance(r, g, real, imaginary, pairs, n0, nm, ne)
+                last, n0 = n0, ne
                 if changes:
                     smooth = _power_terms(terms, q0) + strength * z
                     n0 = mass * (_at(motion, 2, index, position + left)
@@ -455,7 +464,7 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                         slip = np.sign(n0 - smooth)
                         n0 = smooth + level * slip
                     v0 = 0.0
-                    p0, p1, p2 = n0, 0.0, 0.0
+                    last, nm, ne = n0, n0, n0
             position = position + left if changes else 1.0
             if position > 1 - _SHORTEST:
                 break

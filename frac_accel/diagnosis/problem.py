@@ -12,7 +12,7 @@ from ..effects.time_delay import TimeDelay
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel
 from ..parameters import parameter_fields
-from ..simulation import AxisSimulator
+from ..simulation import AxisSimulator, kept
 
 # Samples at both ends that the band-limited simulation cannot know.
 _EDGE = 64
@@ -24,8 +24,8 @@ _STEP = 1e-3
 # the cause adds, where measured) and for its derivatives (ten times that, which bends no fit).
 _STEPS = 4
 _STEPS_OF_SLOPES = 2
-# Outputs of the other axes that are kept.
-_KEPT = 8
+# Logarithm of what is left of a decay where it ends.
+_GONE = -60.0
 # A gain of this share of one sample's error changes nothing that the data can tell.
 _SMALL_GAIN = 1e-2
 
@@ -134,6 +134,7 @@ class Problem:
         self.used[:edge] = self.used[-edge:] = False
         self._simulators = {}
         self._last, self._moved, self._others = (None, None), (None, None), {}
+        self._columns = {}
         self.calls = 0
 
     @property
@@ -187,12 +188,8 @@ class Problem:
             model = self._on_stamps(self.axis_model(effects, other))
             before = tuple(e for e in model.effects if e.stage < CROSS_AXIS)
             key = other, steps, before
-            if key not in self._others:
-                while len(self._others) >= _KEPT:
-                    del self._others[next(iter(self._others))]
-                self._others[key] = self.simulator(other, steps).simulate(
-                    AxisModel(model.core, before))
-            total += share * self._others[key]
+            total += share * kept(self._others, key, self.simulator(other, steps).simulate,
+                                  AxisModel(model.core, before))
         return total
 
     def change(self, effects, cause, effect):
@@ -241,12 +238,15 @@ class Problem:
 
     def free_columns(self, effects):
         """What the time before the record may have left, shape (n, m); 0 where none counts."""
+        model = self.axis_model(effects)
+        return kept(self._columns, model.dynamics, self._free_columns, model, most=2)
+
+    def _free_columns(self, model):
         try:
-            poles = np.atleast_1d(self.axis_model(effects).poles())
+            poles = np.atleast_1d(model.poles())
         except (FracAccelError, ArithmeticError):
             poles = np.array([])
-        core = self.axis_model(effects).effective_core
-        rates = []
+        core, rates = model.effective_core, []
         if getattr(core, "damping_order", 1.0) != 1.0:
             rates = tail_rates(core.natural_frequency_hz, self.time[-1])
         return self._decays([*(-rate + 0j for rate in rates), *poles])
@@ -262,12 +262,16 @@ class Problem:
         for pole in poles:
             if pole.imag < 0 or -pole.real * self.time[-1] < 0.999:
                 continue
-            decay = np.exp(np.maximum(pole.real * self.time, -60))
-            turn = pole.imag * self.time
-            columns += [decay] if pole.imag == 0 else [decay * np.cos(turn), decay * np.sin(turn)]
-        columns = [column * self.used for column in columns]
+            # as far as there is anything left of it
+            time = self.time[:1 + int(min(_GONE * self.rate / pole.real, len(self.time)))]
+            motion = np.exp(pole * time)
+            columns += [motion.real] if pole.imag == 0 else [motion.real, motion.imag]
+        columns = [column * self.used[:len(column)] for column in columns]
         columns = [column for column in columns if np.max(np.abs(column)) > 1e-9]
-        return np.stack(columns, axis=1) if columns else np.zeros((len(self.record), 0))
+        result = np.zeros((len(self.record), len(columns)))
+        for i, column in enumerate(columns):
+            result[:len(column), i] = column
+        return result
 
     def clear(self, values, free):
         """Values where they count, without the free motions; shape (n,) or (n, p)."""
@@ -277,7 +281,7 @@ class Problem:
     def restricted(self, used):
         """The same problem with fewer samples that count."""
         part = object.__new__(type(self))
-        part.__dict__.update(self.__dict__, used=used)
+        part.__dict__.update(self.__dict__, used=used, _columns={})
         return part
 
     def fit(self, effects, iterations=_ITERATIONS, rough=False, hopeless=np.inf):
