@@ -27,7 +27,10 @@ def fractional_root(coefficients, orders):
     with np.errstate(all="ignore"):
         for _ in range(60):
             step = evaluate(coefficients, orders, s) / evaluate(*derivative, s)
-            s = s - step * np.minimum(1, 0.5 * np.abs(s) / np.abs(step))
+            far, size = np.abs(step), np.abs(s)
+            s = s - step * np.minimum(1, 0.5 * size / far)
+            if not np.any((far > 1e-15 * size) & (s.imag > 0)):
+                break
         residual = np.abs(evaluate(coefficients, orders, s))
         size = evaluate(np.abs(coefficients), orders, np.abs(s)).real
     found = s[np.isfinite(residual) & (residual < 1e-10 * size) & (s.imag > 1e-9 * np.abs(s))]

@@ -1,5 +1,7 @@
 """Diagnosis of one axis: from a record and a model to named causes."""
 
+import dataclasses
+
 import numpy as np
 from scipy.fft import rfft
 from scipy.ndimage import uniform_filter1d
@@ -126,7 +128,8 @@ class Engine:
         """Standard uncertainties by cause and parameter, for any spectrum of the residual."""
         if not fitted.unknowns:
             return {}
-        jacobian, used = fitted.jacobian.copy(), self.problem.used
+        jacobian = dataclasses.replace(fitted, exact=True).jacobian
+        used = self.problem.used
         for i, unknown in enumerate(fitted.unknowns):
             value = getattr(fitted.effects[unknown.cause], unknown.name)
             jacobian[:, i] /= value if unknown.logarithmic else unknown.scale

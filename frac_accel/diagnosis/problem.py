@@ -85,6 +85,8 @@ class Fitted:
         Whether more iterations would gain nothing that counts.
     rough : bool
         Whether steps and iterations were spared.
+    exact : bool
+        Whether derivatives leave nothing out.
     """
 
     problem: "Problem"
@@ -93,6 +95,7 @@ class Fitted:
     theta: np.ndarray
     settled: bool = False
     rough: bool = False
+    exact: bool = False
 
     effects = property(lambda self: self.point.effects)
     simulated = property(lambda self: self.point.simulated)
@@ -175,11 +178,11 @@ class Problem:
             if effect.stage != CROSS_AXIS:
                 values = effect.simulate(values, simulator.circumstances)
             elif across:
-                values = values + self._across(effects, effect, steps)
+                values = values + self._across(effects, effect)
         return values
 
-    def _across(self, effects, cross, steps):
-        """What the other axes add."""
+    def _across(self, effects, cross):
+        """What the other axes add; so little that few steps do."""
         total = np.zeros(len(self.record))
         for other, name in enumerate(AXES):
             share = getattr(cross, name)
@@ -187,9 +190,9 @@ class Problem:
                 continue
             model = self._on_stamps(self.axis_model(effects, other))
             before = tuple(e for e in model.effects if e.stage < CROSS_AXIS)
-            key = other, steps, before
-            total += share * kept(self._others, key, self.simulator(other, steps).simulate,
-                                  AxisModel(model.core, before))
+            total += share * kept(
+                self._others, (other, before),
+                self.simulator(other, _STEPS_OF_SLOPES).simulate, AxisModel(model.core, before))
         return total
 
     def change(self, effects, cause, effect):
@@ -264,8 +267,8 @@ class Problem:
                 continue
             # as far as there is anything left of it
             time = self.time[:1 + int(min(_GONE * self.rate / pole.real, len(self.time)))]
-            motion = np.exp(pole * time)
-            columns += [motion.real] if pole.imag == 0 else [motion.real, motion.imag]
+            decay, turn = np.exp(pole.real * time), pole.imag * time
+            columns += [decay] if pole.imag == 0 else [decay * np.cos(turn), decay * np.sin(turn)]
         columns = [column * self.used[:len(column)] for column in columns]
         columns = [column for column in columns if np.max(np.abs(column)) > 1e-9]
         result = np.zeros((len(self.record), len(columns)))
@@ -307,26 +310,33 @@ class Problem:
         return self._improved(Fitted(self, point, unknowns, theta, rough=rough), iterations,
                               hopeless)
 
-    def finished(self, fit, hopeless=np.inf):
-        """A rough fit with the steps and iterations that it was spared."""
-        finer = Fitted(self, self._point(fit.effects, False), fit.unknowns, fit.theta)
-        finer.jacobian = fit.jacobian
-        return self._improved(finer, hopeless=hopeless)
+    def finished(self, fit, hopeless=np.inf, goal=np.inf):
+        """A rough fit with the steps and iterations that it was spared.
 
-    def _improved(self, here, iterations=_ITERATIONS, hopeless=np.inf):
+        It ends, too, where its pace would not take it to a `goal` (a cost).
+        """
+        finer = Fitted(self, self._point(fit.effects, False), fit.unknowns, fit.theta,
+                       exact=fit.exact)
+        finer.jacobian = fit.jacobian
+        return self._improved(finer, _ITERATIONS, hopeless, goal)
+
+    def _improved(self, here, iterations, hopeless, goal=np.inf):
         """A fit with more iterations."""
         damping, here.settled = 0.0, not here.unknowns
+        spared = len({*map(acts_on_spring, here.effects.values())}) > 1
         low, high = np.array([(u.low, u.high) for u in here.unknowns]).reshape(-1, 2).T
-        for _ in range(iterations if here.unknowns else 0):
-            gram, slope = here.jacobian.T @ here.jacobian, here.jacobian.T @ here.residual
+        for left in reversed(range(iterations if here.unknowns else 0)):
+            gram, slope = _normal(here)
             small = _SMALL_GAIN * here.cost / self.count
             there = None
             for _ in range(_TRIES):
-                step = _step(gram, slope, damping, here.theta <= low, here.theta >= high)
-                if step @ slope < small:
+                step = _step(gram, slope, damping, np.maximum(low - here.theta, -1.0),
+                             np.minimum(high - here.theta, 1.0))
+                promised = 2 * step @ slope - step @ gram @ step
+                if promised < small:
                     here.settled = damping < 1e-2
                     break
-                theta = np.clip(here.theta + np.clip(step, -1, 1), low, high)
+                theta = np.clip(here.theta + step, low, high)
                 try:
                     there = self._point(self.replaced(here.effects, here.unknowns, theta),
                                         here.rough)
@@ -334,19 +344,27 @@ class Problem:
                     there = None
                 if there is not None and there.cost < here.cost:
                     break
-                there, damping = None, max(10 * damping, 1e-3)
+                there = None
+                if spared and not here.exact:
+                    here = dataclasses.replace(here, exact=True)
+                    gram, slope = _normal(here)
+                    continue
+                if promised < here.cost / self.count:
+                    break  # of no more use than one sample
+                damping = max(10 * damping, 1e-3)
             if there is None:
                 break
             gained, went = here.cost - there.cost, theta - here.theta
             kept = gained / (2 * went @ slope - went @ gram @ went)
             here = Fitted(self, there, here.unknowns, theta, gained < small and damping < 1e-2,
-                          here.rough)
+                          here.rough, here.exact)
             # where the parabola promises too much, a longer step would only be refused
             if kept > 0.75:
                 damping = damping / 10 if damping > 1e-6 else 0.0
             elif kept < 0.25:
                 damping = max(2 * damping, 1e-3)
-            if gained < (here.cost if here.cost > hopeless else small):
+            if gained < (here.cost if here.cost > hopeless else small) \
+                    or here.cost - left * gained > goal:
                 break
         return here
 
@@ -370,8 +388,10 @@ class Problem:
         forced = any(map(acts_on_spring, point.effects.values()))
         steps = _STEPS_OF_SLOPES if forced else _STEPS
         before = point.simulated
-        if forced and not fit.rough:
-            before = self.simulate(point.effects, steps=steps)
+        model = self.axis_model(point.effects)
+        crossed = any(effect.stage == CROSS_AXIS for effect in model.effects)
+        if forced and (crossed or not fit.rough):
+            before = self.simulate(point.effects, False, steps)
         for i, unknown in enumerate(fit.unknowns):
             for step in (unknown.step, -unknown.step):
                 moved = theta.copy()
@@ -380,10 +400,13 @@ class Problem:
                     continue
                 try:
                     new = self.replaced(point.effects, fit.unknowns, moved)
-                    if forced and not acts_on_spring(point.effects[unknown.cause]):
-                        change = self.change(point.effects, unknown.cause, new[unknown.cause])
+                    effect = new[unknown.cause]
+                    if forced and (effect.stage == CROSS_AXIS
+                                   or not (fit.exact or acts_on_spring(effect))):
+                        change = self.change(point.effects, unknown.cause, effect)
                     else:
-                        change = self.simulate(new, steps=steps) - before
+                        # with forces, what comes across stays as it is: a few per cent of a column
+                        change = self.simulate(new, not forced, steps) - before
                 except FracAccelError:
                     continue
                 if point.left is not None:
@@ -440,8 +463,9 @@ class Problem:
         typical = {"delay_s": 1 / self.rate, "skew_ppm": 100.0, "offset": level,
                    "rate_per_s": 1 / self.time[-1], "coefficient_per_k": 0.01,
                    "alpha2": 0.1 / level, "alpha3": 0.1 / level**2, "gamma": 1 / level,
-                   "phase_rad": 1.0, "amplitude": level, "damping_order": 1.0, "gain": 1.0,
-                   "x": 1.0, "y": 1.0, "z": 1.0}
+                   "level": 0.1 * level, "half_width": 0.1 * level, "strength": 0.1,
+                   "beta": 1 / level, "phase_rad": 1.0, "amplitude": level, "gain": 1.0,
+                   "damping_order": 1.0, "x": 1.0, "y": 1.0, "z": 1.0}
         return typical.get(name, max(abs(value), 1e-12))
 
 
@@ -466,18 +490,24 @@ def _from_theta(value, unknown):
     return float(np.exp(value)) if unknown.logarithmic else float(value * unknown.scale)
 
 
-def _step(gram, slope, damping, at_low, at_high):
-    """Step of the damped least squares; what would leave its bounds stays where it is."""
-    free = np.ones(len(slope), bool)
-    while True:
-        step = np.zeros(len(slope))
-        if free.any():
-            part = gram[np.ix_(free, free)]
-            step[free] = _solve(part + damping * np.diag(np.diag(part)), slope[free])
-        beyond = (at_low & (step < 0)) | (at_high & (step > 0))
+def _normal(fit):
+    """Products of the derivatives among themselves and with the residual."""
+    return fit.jacobian.T @ fit.jacobian, fit.jacobian.T @ fit.residual
+
+
+def _step(gram, slope, damping, least, most):
+    """Step of the damped least squares within bounds; what would leave them stays on them."""
+    damped = gram + damping * np.diag(np.diag(gram))
+    step, free = np.zeros(len(slope)), np.ones(len(slope), bool)
+    while free.any():
+        rest = slope[free] - damped[np.ix_(free, ~free)] @ step[~free]
+        step[free] = _solve(damped[np.ix_(free, free)], rest)
+        beyond = free & ((step < least) | (step > most))
         if not beyond.any():
-            return step
+            break
+        step[beyond] = np.clip(step, least, most)[beyond]
         free &= ~beyond
+    return step
 
 
 def _solve(matrix, right):

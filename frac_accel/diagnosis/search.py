@@ -20,6 +20,8 @@ _STUCK = 0.2
 _TRIAL = 4
 _HOPELESS = 4.0
 _BEHIND = 2.0
+# Variances from the best fit of a round within which a fit must come if it goes on as it goes.
+_NEAR = 200.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,10 +74,12 @@ class Search:
             except FracAccelError:
                 continue  # a motion without bound describes no record
             best = min(best, trials[key].cost)
+        goal = np.inf
         for key, trial in sorted(trials.items(), key=lambda entry: entry[1].cost):
             if trial.rough and trial.cost <= _HOPELESS * best:
-                trial = self.problem.finished(trial, _BEHIND * best)
+                trial = self.problem.finished(trial, _BEHIND * best, goal)
                 best = min(best, trial.cost)
+            goal = min(goal, (1 + _NEAR / self.problem.count) * trial.cost)
             if trial is not self.fits.get(key):
                 self._keep(trial)
         return sorted((self.fits[key] for key in trials), key=lambda fit: fit.cost)
