@@ -5,6 +5,7 @@ import functools
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from ..core.oscillator import tail_rates
 from ..effects.base import CORE, CROSS_AXIS, GAIN, Effect
@@ -20,6 +21,8 @@ _EDGE = 64
 _ITERATIONS = 12
 _TRIES = 6
 _STEP = 1e-3
+# Share of the largest eigenvalue of the scaled products of derivatives that counts as none.
+_SINGULAR = 1e-10
 # Steps of a nonlinear core in each sampling interval: for the output (wrong by at most 3e-4 of what
 # the cause adds, where measured) and for its derivatives (ten times that, which bends no fit).
 _STEPS = 4
@@ -496,20 +499,11 @@ def _normal(fit):
 
 
 def _step(gram, slope, damping, least, most):
-    """Step of the damped least squares within bounds; what would leave them stays on them."""
-    damped = gram + damping * np.diag(np.diag(gram))
-    step, free = np.zeros(len(slope)), np.ones(len(slope), bool)
-    while free.any():
-        rest = slope[free] - damped[np.ix_(free, ~free)] @ step[~free]
-        step[free] = _solve(damped[np.ix_(free, free)], rest)
-        beyond = free & ((step < least) | (step > most))
-        if not beyond.any():
-            break
-        step[beyond] = np.clip(step, least, most)[beyond]
-        free &= ~beyond
-    return step
-
-
-def _solve(matrix, right):
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    return np.linalg.lstsq(matrix / np.outer(scale, scale), right / scale, rcond=1e-10)[0] / scale
+    """Step of the damped least squares within bounds; none where the derivatives say nothing."""
+    scale = np.sqrt(np.maximum((1 + damping) * np.diag(gram), 1e-300))
+    damped = (gram + damping * np.diag(np.diag(gram))) / np.outer(scale, scale)
+    sizes, vectors = np.linalg.eigh(damped)
+    root = np.sqrt(np.maximum(sizes, _SINGULAR * sizes[-1]))
+    right = np.where(sizes > _SINGULAR * sizes[-1], vectors.T @ (slope / scale) / root, 0.0)
+    return lsq_linear(root[:, None] * vectors.T, right, (least * scale, most * scale),
+                      method="bvls").x / scale
