@@ -8,6 +8,8 @@ from scipy.fft import irfft, next_fast_len, rfft
 # shorter period lets what rings ahead of full-band input come back, thirty times larger at 1.5.
 _DAMPING = np.log(1e8)
 _PERIOD = 2
+# Share of the frequencies, the highest, over which a response is turned to be real at the last.
+_TURNED = 0.2
 _LAGRANGE_POINTS = 8
 
 
@@ -42,6 +44,8 @@ class Convolution:
         frequency = 2j * np.pi * np.arange(self._length // 2 + 1) / self._length
         self._s = (self._sigma + frequency) * rate
         self._spectrum = rfft(values * damping, self._length)
+        ramp = np.linspace(0, 1, len(self._s) - int((1 - _TURNED) * len(self._s)))
+        self._ramp = ramp * ramp * (3 - 2 * ramp)
 
     @property
     def s(self):
@@ -51,7 +55,7 @@ class Convolution:
     def response(self, transfer):
         """Responses of systems, shape (..., n), from their transfer functions (...) at `s`."""
         spectrum = self._spectrum * transfer
-        _smooth_at_nyquist(spectrum, transfer[..., -1:])
+        self._smooth_at_nyquist(spectrum, transfer[..., -1:])
         return irfft(spectrum, self._length)[..., :self._n] * self._undamped(1, self._n)
 
     def response_between(self, transfer, factor, count):
@@ -64,6 +68,17 @@ class Convolution:
         values = irfft(spectrum, factor * self._length)[:count]
         values *= self._undamped(factor, count)
         return values
+
+    def _smooth_at_nyquist(self, spectrum, last):
+        """Turn the phase so that `last`, the response at the Nyquist frequency, becomes real.
+
+        In place, by a turn that grows over the last fifth below that frequency. Anything else
+        there jumps to its conjugate, and the jump rings through the record from both its ends with
+        an amplitude that falls only as 1/n.
+        """
+        angle = np.angle(last)
+        turn = (angle - np.round(angle / np.pi) * np.pi) * self._ramp
+        spectrum[..., -len(self._ramp):] *= np.cos(turn) - 1j * np.sin(turn)
 
     def _undamped(self, factor, count):
         key = factor, count
@@ -100,21 +115,6 @@ def at_positions(values, position):
                 weight *= (place - j) / (i - j)
         result += weight * values[first + i]
     return result
-
-
-def _smooth_at_nyquist(spectrum, last):
-    """Turn the phase so that `last`, the response at the Nyquist frequency, becomes real.
-
-    In place, by a turn that grows over the last fifth below that frequency. Anything else there
-    jumps to its conjugate, and the jump rings through the record from both its ends with an
-    amplitude that falls only as 1/n.
-    """
-    first = int(0.8 * spectrum.shape[-1])
-    ramp = np.linspace(0, 1, spectrum.shape[-1] - first)
-    angle = np.angle(last)
-    excess = angle - np.round(angle / np.pi) * np.pi
-    turn = excess * (ramp * ramp * (3 - 2 * ramp))
-    spectrum[..., first:] *= np.cos(turn) - 1j * np.sin(turn)
 
 
 def _fast_length(n):

@@ -6,6 +6,7 @@ import numpy as np
 
 from .convolution import Convolution, at_positions
 from .core import Arx
+from .core.modes import modes_of
 from .effects.base import CORE, GAIN, Circumstances
 from .errors import FracAccelError, ModelError
 from .model import AXES
@@ -184,7 +185,6 @@ class AxisSimulator:
         except ImportError as error:
             raise FracAccelError(f"a model with a nonlinear spring or friction needs numba to be "
                                  f"simulated: pip install numba ({error})") from None
-        from .core.modes import modes_of
         core = model.effective_core
         natural = 2 * np.pi * core.natural_frequency_hz
         wanted = self._least_steps * max(1.0, 3 * core.natural_frequency_hz / self._rate)
@@ -196,8 +196,7 @@ class AxisSimulator:
         load = self._level * core.sensitivity
         orders = nonlinear_motion.derivatives_needed(force) + 1
         wanted = links, natural, orders, steps, count
-        motion = kept(self._motions, wanted, self._core_motion, *wanted, most=1)
-        modes = modes_of(core, self._rate / count, natural + np.pi * self._rate * steps)
+        motion, modes = kept(self._motions, wanted, self._core_motion, *wanted, most=1)
         start = force.equilibrium(load) - load
         deviation = nonlinear_motion.deviation(
             modes, force, natural / (self._rate * steps), motion, start)
@@ -219,14 +218,15 @@ class AxisSimulator:
         return gain[0].real * (moving + start)
 
     def _core_motion(self, links, natural, orders, steps, count):
-        """Linear motion and its derivatives by the time natural * t, shape (orders, n)."""
+        """Linear motion and its derivatives by the time natural * t, shape (orders, n); modes."""
         convolution, transfer = self._convolution, self._transfer(links)
         motion = np.empty((orders, steps * count))
         for order in range(orders):
             motion[order] = convolution.response_between(transfer, steps, steps * count)
             transfer = transfer * (convolution.s / natural)
         motion[0] += self._level * links[0].sensitivity
-        return motion
+        return motion, modes_of(links[0], self._rate / count,
+                                natural + np.pi * self._rate * steps)
 
     def _transfer(self, links):
         """Composite transfer function of some links, a core first, where the convolution is."""

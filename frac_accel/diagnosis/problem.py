@@ -56,7 +56,7 @@ class Point(NamedTuple):
         Output with them, without what the time before the record may have left.
     columns, free : ndarray, shape (n, m)
         Free motions that this may be, and an orthonormal basis of them.
-    left : ndarray, shape (m,), or None
+    left : ndarray, shape (m,)
         Size of each column in the record.
     residual : ndarray, shape (n,)
         Measured less simulated and free motions [output units]; 0 where a sample does not count.
@@ -261,7 +261,7 @@ class Problem:
         """Orthonormal columns, shape (n, m): slow motions that a cause of its own may have left."""
         slow = [pole for pole in np.atleast_1d(effect.poles())
                 if -pole.real * _EDGE < self.rate]
-        return _basis(self._decays(slow))
+        return _span(self._decays(slow))[0]
 
     def _decays(self, poles):
         columns = []
@@ -377,11 +377,11 @@ class Problem:
         if not np.isfinite(simulated).all():
             raise FracAccelError("the motion has no bound")
         columns = self.free_columns(effects)
-        free = _basis(columns)
+        free, back = _span(columns)
         error = (self.measured - simulated) * self.used
-        residual = error - free @ (free.T @ error)
-        left = np.linalg.lstsq(columns, error - residual, rcond=1e-10)[0] if free.size else None
-        return Point(effects, simulated, columns, free, left, residual,
+        components = free.T @ error
+        residual = error - free @ components
+        return Point(effects, simulated, columns, free, back @ components, residual,
                      float(residual @ residual))
 
     def slopes(self, fit):
@@ -412,10 +412,9 @@ class Problem:
                         change = self.simulate(new, not forced, steps) - before
                 except FracAccelError:
                     continue
-                if point.left is not None:
-                    free = self.free_columns(new)
-                    if free.shape == point.columns.shape:
-                        change = change + (free - point.columns) @ point.left
+                free = self.free_columns(new)
+                if free is not point.columns and free.shape == point.columns.shape:
+                    change = change + (free - point.columns) @ point.left
                 columns[:, i] = change / (moved[i] - theta[i])
                 break
         return self.clear(columns, point.free)
@@ -472,12 +471,13 @@ class Problem:
         return typical.get(name, max(abs(value), 1e-12))
 
 
-def _basis(columns):
-    """Orthonormal columns that span the same space."""
+def _span(columns):
+    """Orthonormal columns that span the same space, and what makes theirs of components of it."""
     if not columns.shape[1]:
-        return columns
-    vectors, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    return vectors[:, sizes > 1e-6 * sizes[0]]
+        return columns, np.zeros((0, 0))
+    vectors, sizes, turned = np.linalg.svd(columns, full_matrices=False)
+    count = int(np.sum(sizes > 1e-6 * sizes[0]))
+    return vectors[:, :count], turned[:count].T / sizes[:count]
 
 
 def acts_on_spring(effect):
