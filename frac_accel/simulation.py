@@ -17,6 +17,8 @@ _REFINED = 4
 # natural period.
 _STEPS_PER_SAMPLE = 8
 _MOST_STEPS_PER_SAMPLE = 64
+# With fewer steps the modes of a fractional memory need not be finer.
+_FEW_STEPS = 4
 # Samples that a response between samples needs after the last one.
 _BEYOND = 8
 
@@ -226,7 +228,8 @@ class AxisSimulator:
             transfer = transfer * (convolution.s / natural)
         motion[0] += self._level * links[0].sensitivity
         return motion, modes_of(links[0], self._rate / count,
-                                natural + np.pi * self._rate * steps)
+                                natural + np.pi * self._rate * steps,
+                                coarse=self._least_steps < _FEW_STEPS)
 
     def _transfer(self, links):
         """Composite transfer function of some links, a core first, where the convolution is."""

@@ -18,10 +18,10 @@ import dataclasses
 
 import numpy as np
 
-_LOG_RATE_STEP = 0.75  # error of the quadrature 2e-6
-# The memory's rates reach this far beyond those of the motion: the spring and the dashpot that
-# stand for the rest then err by a part in so many.
-_MARGIN = 1e4
+# Spacing of the memory's rates in ln r, and how far they reach beyond those of the motion: the
+# spring and the dashpot that stand for the rest then err by a part in so many.
+_FINE = 0.75, 1e4    # error of the quadrature 2e-6
+_COARSE = 1.0, 1e2   # 5e-5: of the motion, as measured, 3e-5 to 1.2e-4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,8 +47,11 @@ class Modes:
     mass: float
 
 
-def modes_of(core, slowest_rad_s, fastest_rad_s):
-    """Modes of an `Oscillator` for motion between two angular frequencies [rad/s]."""
+def modes_of(core, slowest_rad_s, fastest_rad_s, coarse=False):
+    """Modes of an `Oscillator` for motion between two angular frequencies [rad/s].
+
+    With `coarse` a fractional memory is made of half as many.
+    """
     natural = 2 * np.pi * core.natural_frequency_hz
     zeta, order = core.damping_ratio, core.damping_order
     if order == 1:
@@ -56,7 +59,8 @@ def modes_of(core, slowest_rad_s, fastest_rad_s):
             zeta = 1 + 1e-8  # two poles at one place have no partial fractions
         poles = np.roots([1, 2 * zeta, 1]).astype(complex)
         return _one_of_each_pair(poles, 1 / (2 * poles + 2 * zeta), -1 / poles, 1.0)
-    memory = _Memory.of(order, zeta, slowest_rad_s / natural, fastest_rad_s / natural)
+    memory = _Memory.of(order, zeta, slowest_rad_s / natural, fastest_rad_s / natural,
+                        *(_COARSE if coarse else _FINE))
     poles, residues = memory.modes()
     displacement = poles + memory.dashpot if order < 1 else -1 / poles
     return _one_of_each_pair(poles, residues, displacement,
@@ -84,14 +88,14 @@ class _Memory:
     dashpot: float
 
     @classmethod
-    def of(cls, order, zeta, slowest, fastest):
+    def of(cls, order, zeta, slowest, fastest, log_step, margin):
         beta = order % 1
-        first, last = np.log([slowest / _MARGIN, fastest * _MARGIN]) / _LOG_RATE_STEP
-        rates = np.exp(_LOG_RATE_STEP * np.arange(np.floor(first), np.ceil(last) + 1))
-        scale = 2 * zeta * np.sin(np.pi * beta) / np.pi * _LOG_RATE_STEP
+        first, last = np.log([slowest / margin, fastest * margin]) / log_step
+        rates = np.exp(log_step * np.arange(np.floor(first), np.ceil(last) + 1))
+        scale = 2 * zeta * np.sin(np.pi * beta) / np.pi * log_step
         # the two geometric sums outside the range
-        spring = scale * rates[0]**beta / np.expm1(beta * _LOG_RATE_STEP)
-        dashpot = scale * rates[-1]**(beta - 1) / np.expm1((1 - beta) * _LOG_RATE_STEP)
+        spring = scale * rates[0]**beta / np.expm1(beta * log_step)
+        dashpot = scale * rates[-1]**(beta - 1) / np.expm1((1 - beta) * log_step)
         return cls(order, rates, scale * rates**beta, spring, dashpot)
 
     def modes(self):

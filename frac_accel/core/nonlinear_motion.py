@@ -91,16 +91,15 @@ def _moments(z):
         m0 = (whole - 1) / z
         m1 = (m0 - 1) / z
         return m0, m1, (2 * m1 - 1) / z, whole
-    m0, m1, m2 = 0 * z, 0 * z, 0 * z
-    term = 1 + 0 * z
-    for i in range(16):
-        # z**i k! / (i + k + 1)!
-        m0 += term / (i + 1)
-        m1 += term / ((i + 1) * (i + 2))
-        m2 += 2 * term / ((i + 1) * (i + 2) * (i + 3))
-        term *= z / (i + 1)
-        if abs(term) < 1e-16:
-            break
+    # sum of z**i 2 / (i + 3)!, and from it m[k - 1] = (1 + z m[k]) / k
+    square = z * z
+    rest = square * square * (1 / 19958400 + z * (1 / 239500800)
+                              + square * (1 / 3113510400 + z * (1 / 43589145600)))
+    rest = square * square * (1 / 2520 + z * (1 / 20160)
+                              + square * (1 / 181440 + z * (1 / 1814400)) + rest)
+    m2 = 1 / 3 + z * (1 / 12) + square * (1 / 60 + z * (1 / 360)) + rest
+    m1 = (1 + z * m2) / 2
+    m0 = 1 + z * m1
     return m0, m1, m2, 1 + z * m0
 
 

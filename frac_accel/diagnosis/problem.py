@@ -500,7 +500,8 @@ def _normal(fit):
 
 def _step(gram, slope, damping, least, most):
     """Step of the damped least squares within bounds; none where the derivatives say nothing."""
-    scale = np.sqrt(np.maximum((1 + damping) * np.diag(gram), 1e-300))
+    sizes = (1 + damping) * np.diag(gram)
+    scale = np.sqrt(np.where(sizes > 0, sizes, 1.0))
     damped = (gram + damping * np.diag(np.diag(gram))) / np.outer(scale, scale)
     sizes, vectors = np.linalg.eigh(damped)
     root = np.sqrt(np.maximum(sizes, _SINGULAR * sizes[-1]))
