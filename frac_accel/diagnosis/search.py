@@ -63,11 +63,8 @@ class Search:
         self.fits[fit.causes] = fit
         self.log(f"fit {sorted(fit.causes - set(self.base))}: {fit.cost:.6g}")
 
-    def fit_all(self, sets, best=np.inf, done=None):
-        """Fitted sets by cost; those that fall far behind (a cost) are not fitted to the end.
-
-        Those after the first that is `done` (a callable) are not tried.
-        """
+    def fit_all(self, sets, best=np.inf):
+        """Fitted sets by cost; those that fall far behind (a cost) are not fitted to the end."""
         trials = {}
         for effects in sets:
             key = frozenset(effects)
@@ -76,10 +73,7 @@ class Search:
                     effects, _TRIAL, rough=True, hopeless=_HOPELESS * best)
             except FracAccelError:
                 continue  # a motion without bound describes no record
-            if trials[key].cost < best:
-                best = trials[key].cost
-                if done and done(trials[key]):
-                    break
+            best = min(best, trials[key].cost)
         goal = np.inf
         for key, trial in sorted(trials.items(), key=lambda entry: entry[1].cost):
             if trial.rough and trial.cost <= _HOPELESS * best:
@@ -182,7 +176,7 @@ class Search:
                             and (key not in wanted or cost < wanted[key][0]):
                         wanted[key] = cost, {**parent.effects, cause: begin}
             chosen = sorted(wanted.values(), key=lambda entry: entry[0])[:_FITS]
-            fits = self.fit_all([effects for _, effects in chosen], done=done)
+            fits = self.fit_all([effects for _, effects in chosen])
             if not fits or best.cost - fits[0].cost < threshold(best):
                 break
             gained, best, beam = 1 - fits[0].cost / best.cost, fits[0], fits[:_BEAM]
