@@ -51,7 +51,7 @@ def test_derivatives_beside_a_force_are_those_of_a_finer_simulation(cause):
     effects = {name: known_effects()[name](**values)
                for name, values in case.truth.items()}
     fit = dataclasses.replace(problem.fit(effects, iterations=0), exact=True)
-    fine = AxisSimulator(problem.record.reference[:, problem.axis], problem.rate, celsius,
+    fine = AxisSimulator(problem.record.reference[:, problem.axis], problem.rate,
                          steps_per_sample=16)
 
     def output(theta):
