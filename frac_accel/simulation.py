@@ -197,8 +197,8 @@ class AxisSimulator:
         links = (core, *(effect for effect in model.dynamics[1:] if effect.stage < CORE))
         load = self._level * core.sensitivity
         orders = nonlinear_motion.derivatives_needed(force) + 1
-        wanted = links, natural, orders, steps, count
-        motion, modes = kept(self._motions, wanted, self._core_motion, *wanted, most=1)
+        known_by = links, natural, orders, steps, count
+        motion, modes = kept(self._motions, known_by, self._core_motion, *known_by, most=1)
         start = force.equilibrium(load) - load
         deviation = nonlinear_motion.deviation(
             modes, force, natural / (self._rate * steps), motion, start)
