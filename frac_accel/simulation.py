@@ -129,7 +129,7 @@ class AxisSimulator:
         self._start_time_s = start_time_s
         self._least_steps = steps_per_sample
         self._convolution, self._room_s = None, 0.0
-        self._transfers, self._motions = {}, {}
+        self._transfers, self._motions, self._deviations = {}, {}, {}
         self.circumstances = Circumstances(start_time_s + np.arange(self._n) / self._rate,
                                            _temperature(temperature_c, self._n))
 
@@ -200,8 +200,8 @@ class AxisSimulator:
         known_by = links, natural, orders, steps, count
         motion, modes = kept(self._motions, known_by, self._core_motion, *known_by, most=1)
         start = force.equilibrium(load) - load
-        deviation = nonlinear_motion.deviation(
-            modes, force, natural / (self._rate * steps), motion, start)
+        deviation = kept(self._deviations, (known_by, force), nonlinear_motion.deviation, modes,
+                         force, natural / (self._rate * steps), motion, start)
         if not np.isfinite(deviation[-1]):
             raise FracAccelError("the model's motion grows without bound: its nonlinear terms are "
                                  "too large for this record")
@@ -241,15 +241,17 @@ class AxisSimulator:
     def _prepared(self, delay_s):
         """Convolution with room for a delay."""
         if self._convolution is None or abs(delay_s) > self._room_s:
-            self._transfers, self._motions = {}, {}
+            self._transfers, self._motions, self._deviations = {}, {}, {}
             self._room_s = max(abs(delay_s), 64 / self._rate)
             self._convolution = Convolution(self._moving, self._rate, self._room_s)
         return self._convolution
 
 
 def kept(store, key, make, *arguments, most=8):
-    """What `make` returns, from the dict `store` if it is there; the last few made stay there."""
-    if key not in store:
+    """What `make` returns, from the dict `store` if it is there; the last few used stay there."""
+    if key in store:
+        store[key] = store.pop(key)
+    else:
         while len(store) >= most:
             del store[next(iter(store))]
         store[key] = make(*arguments)

@@ -22,6 +22,8 @@ import numpy as np
 # spring and the dashpot that stand for the rest then err by a part in so many.
 _FINE = 0.75, 1e4    # error of the quadrature 2e-6
 _COARSE = 1.0, 1e2   # 5e-5: of the motion, as measured, 3e-5 to 1.2e-4
+# To find the real zeros.
+_HALVINGS, _NEWTON_STEPS = 12, 8
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,11 +111,17 @@ class _Memory:
         neighbours = np.r_[0.0, self.rates[:-1]] if side > 0 else np.r_[self.rates[1:], np.inf]
         room = np.minimum(np.abs(neighbours - self.rates), 1e3 * self.rates + 1e3)
         low, high = np.full(len(self.rates), -300.0), np.zeros(len(self.rates))
-        for _ in range(64):
-            middle = (low + high) / 2
-            inside = self._beside(side * room * np.exp(middle))[0] < 0
-            low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-        distance = side * room * np.exp(low)
+        middle = (low + high) / 2
+        for i in range(_HALVINGS + _NEWTON_STEPS):
+            distance = side * room * np.exp(middle)
+            value, slope = self._beside(distance)
+            low, high = np.where(value < 0, middle, low), np.where(value < 0, high, middle)
+            new = (low + high) / 2
+            if i >= _HALVINGS:
+                newton = middle - value / (slope * distance)
+                new = np.where((newton >= low) & (newton <= high), newton, new)
+            middle = new
+        distance = side * room * np.exp(middle)
         real = distance - self.rates
         mass = 1.0 if side > 0 else 1 + self.dashpot
         u = np.array([1j])

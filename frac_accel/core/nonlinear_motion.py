@@ -26,7 +26,8 @@ _CONVERGED = 1e-7      # of the force
 _SPLITS = 12            # of one step
 _SHORTEST = 1e-9        # part of a step that is none
 _TURN_PASSES = 4
-_TURNED = 1e-5          # of a step, the permitted error of a turn
+_TURNED = 1e-4          # of a step, the permitted error of a turn
+_HALVINGS, _SECANTS = 5, 3  # of a step where a turn is looked for
 
 _fast = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 _exact = numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -104,24 +105,34 @@ def _moments(z):
 
 
 @_inlined
+def _twice_as_far(m0, m1, m2, half):
+    """The moments of 2 z from those of z."""
+    return ((half + 1) * m0 / 2, ((half + 1) * m1 + m0) / 4,
+            ((half + 1) * m2 + m0 + 2 * m1) / 8, half * half)
+
+
+@_inlined
 def _prepare_mode(j, length, pole, residue, rows, gains, sums):
+    m0, m1, m2, decay = _moments(pole * length / 2)
     for i in range(2):
         part = 0.5 * (i + 1)
-        m0, m1, m2, decay = _moments(pole * part * length)
+        if i == 1:
+            m0, m1, m2, decay = _twice_as_far(m0, m1, m2, decay)
         scale = residue * part * length
         g1, g2 = scale * part * m1, scale * part * part * m2
         # of the parabola's coefficients, then of its values at the start, the middle and the end
         g0, g1, g2 = scale * m0 - 3 * g1 + 2 * g2, 4 * (g1 - g2), 2 * g2 - g1
+        if i == 1:
+            gains[0, j], gains[1, j] = g0.real, g0.imag
+            gains[2, j], gains[3, j] = g1.real, g1.imag
+            gains[4, j], gains[5, j] = g2.real, g2.imag
+        factor = decay
         for p in range(3):
-            rows[6 * i + 2 * p, j], rows[6 * i + 2 * p + 1, j] = decay.real, decay.imag
+            rows[6 * i + 2 * p, j], rows[6 * i + 2 * p + 1, j] = factor.real, factor.imag
             sums[i, p, 0] += g0.real
             sums[i, p, 1] += g1.real
             sums[i, p, 2] += g2.real
-            if p == 0:
-                gains[0, j], gains[1, j] = g0.real, g0.imag
-                gains[2, j], gains[3, j] = g1.real, g1.imag
-                gains[4, j], gains[5, j] = g2.real, g2.imag
-            decay, g0, g1, g2 = decay * pole, g0 * pole, g1 * pole, g2 * pole
+            factor, g0, g1, g2 = factor * pole, g0 * pole, g1 * pole, g2 * pole
 
 
 @_exact
@@ -177,18 +188,24 @@ def _parabola(n0, nm, ne, x):
 
 
 @_inlined
-def _at(motion, order, index, part):
-    """Motion `part` of an interval after grid point `index`: polynomial through six points."""
+def _between(motion, index, part):
+    """Motion `part` of an interval after a grid point: by a polynomial through six points."""
     first = min(max(index - 2, 0), motion.shape[1] - 6)
-    place = index - first + part
-    total = 0.0
-    for i in range(6):
-        weight = motion[order, first + i]
-        for j in range(6):
-            if j != i:
-                weight *= (place - j) / (i - j)
-        total += weight
-    return total
+    x0 = index - first + part
+    x1, x2, x3, x4, x5 = x0 - 1, x0 - 2, x0 - 3, x0 - 4, x0 - 5
+    front, centre, back = x0 * x1, x2 * x3, x4 * x5
+    w0, w1 = -x1 * centre * back / 120, x0 * centre * back / 24
+    w2, w3 = -front * x3 * back / 12, front * x2 * back / 12
+    w4, w5 = -front * centre * x5 / 24, front * centre * x4 / 120
+    return (_weighted(motion, 0, first, w0, w1, w2, w3, w4, w5),
+            _weighted(motion, 1, first, w0, w1, w2, w3, w4, w5),
+            _weighted(motion, 2, first, w0, w1, w2, w3, w4, w5))
+
+
+@_inlined
+def _weighted(motion, order, i, w0, w1, w2, w3, w4, w5):
+    return (w0 * motion[order, i] + w1 * motion[order, i + 1] + w2 * motion[order, i + 2]
+            + w3 * motion[order, i + 3] + w4 * motion[order, i + 4] + w5 * motion[order, i + 5])
 
 
 @_inlined
@@ -288,17 +305,33 @@ def _crossing(n0, nm, ne, level):
 
 
 @_exact
-def _crossing_zero(v0, vm, ve, slip):
-    """First part of the step at which the parabola through v0, vm, ve turns against `slip`."""
-    low, high = 0.0, 1.0
+def _turn(speeds, slip):
+    """First part of a step after which the velocity is against `slip`.
+
+    speeds (2, 3): velocity at the start, in the middle and at the end; its slopes by the part. The
+    polynomial with all six goes there (Hermite's interpolation by divided differences).
+    """
+    v0, vm, ve = speeds[0]
+    a0, am, ae = speeds[1]
+    first, second = 2 * (vm - v0), 2 * (ve - vm)
+    c2 = 2 * (first - a0)
+    e2, e3, e4 = 2 * (am - first), 2 * (second - am), 2 * (ae - second)
+    c3, f2, f3 = 2 * (e2 - c2), e3 - e2, 2 * (e4 - e3)
+    c4 = f2 - c3
+    c5 = f3 - f2 - c4
+    low, high, before, after = 0.0, 1.0, v0 * slip, ve * slip
     if vm * slip < 0:
-        high = 0.5
-    for _ in range(30):
+        high, after = 0.5, vm * slip
+    for i in range(_HALVINGS + _SECANTS):
         x = (low + high) / 2
-        if _parabola(v0, vm, ve, x) * slip < 0:
-            high = x
+        if i >= _HALVINGS and before > 0:
+            x = low + (high - low) * before / (before - after)
+        y = x - 0.5
+        value = (v0 + x * (a0 + x * (c2 + y * (c3 + y * (c4 + (x - 1) * c5))))) * slip
+        if value < 0:
+            high, after = x, value
         else:
-            low = x
+            low, before = x, value
     return high
 
 
@@ -312,13 +345,13 @@ def _look(rows, real, imaginary, pairs, motion, middles, index, orders, free):
 
 
 @_exact
-def _look_at_part(rows, real, imaginary, pairs, motion, index, position, left, orders, free):
+def _look_at_part(rows, real, imaginary, pairs, motion, index, position, left, free):
     """Fill `free` for a step of `left` intervals from `position` after a grid point."""
-    for order in range(orders):
-        free[0, order] = (_at(motion, order, index, position + left / 2)
-                          + _seen(rows, 2 * order, real, imaginary, pairs))
-        free[1, order] = (_at(motion, order, index, position + left)
-                          + _seen(rows, 6 + 2 * order, real, imaginary, pairs))
+    for i in range(2):
+        q, v, a = _between(motion, index, position + (0.5 + 0.5 * i) * left)
+        free[i, 0] = q + _seen(rows, 6 * i, real, imaginary, pairs)
+        free[i, 1] = v + _seen(rows, 6 * i + 2, real, imaginary, pairs)
+        free[i, 2] = a + _seen(rows, 6 * i + 4, real, imaginary, pairs)
 
 
 @_exact
@@ -370,7 +403,7 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
     rows, gains, sums, now = (np.empty((12, m)), np.empty((6, m)), np.empty((2, 3, 3)),
                               np.empty((6, m)))
     part_rows, part_gains, part_sums = rows.copy(), gains.copy(), sums.copy()
-    free = np.zeros((2, 3))
+    free, speeds = np.zeros((2, 3)), np.zeros((2, 3))
     real, imaginary = np.zeros(m), np.zeros(m)
     _prepare(step, poles, residues, pairs, rows, gains, sums)
     _start(poles, now, real, imaginary, start, of_displacement)
@@ -385,18 +418,30 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
         n0 = mass * (motion[2, 0] + _seen(now, 4, real, imaginary, pairs))
     last, nm, ne = n0, n0, n0  # force in the last step
     for index in range(motion.shape[1] - 1):
+        if not sticks:
+            # nearly always it goes on as it went
+            _look(rows, real, imaginary, pairs, motion, middles, index, 2, free)
+            wholem, wholee = _beyond(last, nm, ne)
+            wholem, wholee, wholez = _slip(free, sums, step, n0, q0, v0, z, wholem, wholee,
+                                           level * slip, terms, parameters)
+            vm = _motion(free, sums, 0, 1, n0, wholem, wholee)
+            ve = _motion(free, sums, 1, 1, n0, wholem, wholee)
+            if vm * slip >= 0 and ve * slip >= 0:
+                q0, v0, z = _motion(free, sums, 1, 0, n0, wholem, wholee), ve, wholez
+                _advance(rows, gains, real, imaginary, pairs, n0, wholem, wholee)
+                last, n0, nm, ne = n0, wholee, wholem, wholee
+                result[index + 1] = q0 - motion[0, index + 1]
+                continue
         position = 0.0
         for split in range(_SPLITS):
             left = 1.0 - position
             r, g, s = rows, gains, sums
-            orders = 3 if sticks else 2
             if position == 0:
-                _look(r, real, imaginary, pairs, motion, middles, index, orders, free)
+                _look(r, real, imaginary, pairs, motion, middles, index, 3, free)
             else:
                 r, g, s = part_rows, part_gains, part_sums
                 _prepare(step * left, poles, residues, pairs, r, g, s)
-                _look_at_part(r, real, imaginary, pairs, motion, index, position, left, orders,
-                              free)
+                _look_at_part(r, real, imaginary, pairs, motion, index, position, left, free)
             smooth = _power_terms(terms, q0) + strength * z
             changes = False
             if sticks:
@@ -408,14 +453,11 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                     nm, ne = _parabola(n0, nm, ne, share / 2), _parabola(n0, nm, ne, share)
                     r, g, s = part_rows, part_gains, part_sums
                     _prepare(step * left, poles, residues, pairs, r, g, s)
-                end = (motion[0, index + 1], motion[1, index + 1])
-                if changes or position > 0:
-                    end = (_at(motion, 0, index, position + left),
-                           _at(motion, 1, index, position + left))
+                qe, ve, _ = _between(motion, index, position + left)
                 _advance(r, g, real, imaginary, pairs, n0, nm, ne)
-                _add(real, imaginary, q0 - end[0] - _seen(now, 0, real, imaginary, pairs),
+                _add(real, imaginary, q0 - qe - _seen(now, 0, real, imaginary, pairs),
                      of_displacement)
-                _add(real, imaginary, -end[1] - _seen(now, 2, real, imaginary, pairs), of_velocity)
+                _add(real, imaginary, -ve - _seen(now, 2, real, imaginary, pairs), of_velocity)
                 last, n0 = n0, ne
                 if changes:
                     sticks, slip = False, np.sign(n0 - smooth)
@@ -432,15 +474,24 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                 changes = (vm * slip < 0 or ve * slip < 0) and split < _SPLITS - 1
                 if changes:
                     # the part of the step after which the velocity is zero
-                    share = _crossing_zero(v0, vm, ve, slip)
+                    _, _, ae = _between(motion, index, position)
+                    speeds[0, 0], speeds[0, 1], speeds[0, 2] = v0, vm, ve
+                    speeds[1, 0] = ae + _seen(now, 4, real, imaginary, pairs) - n0 / mass
+                    speeds[1, 1] = _motion(free, s, 0, 2, n0, nm, ne) - nm / mass
+                    speeds[1, 2] = _motion(free, s, 1, 2, n0, nm, ne) - ne / mass
+                    for i in range(3):
+                        speeds[1, i] *= step * left
+                    share = _turn(speeds, slip)
                     r, g, s = part_rows, part_gains, part_sums
-                    rest = left
+                    rest, wholem, wholee = left, nm, ne
                     for _ in range(_TURN_PASSES):
                         left = share * rest
                         _prepare(step * left, poles, residues, pairs, r, g, s)
-                        _look_at_part(r, real, imaginary, pairs, motion, index, position, left, 2,
+                        _look_at_part(r, real, imaginary, pairs, motion, index, position, left,
                                       free)
-                        nm, ne, z = _slip(free, s, step * left, n0, q0, v0, z0, n0, n0,
+                        nm, ne, z = _slip(free, s, step * left, n0, q0, v0, z0,
+                                          _parabola(n0, wholem, wholee, share / 2),
+                                          _parabola(n0, wholem, wholee, share),
                                           friction, terms, parameters)
                         vm = _motion(free, s, 0, 1, n0, nm, ne)
                         ve = _motion(free, s, 1, 1, n0, nm, ne)
@@ -454,8 +505,8 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                 last, n0 = n0, ne
                 if changes:
                     smooth = _power_terms(terms, q0) + strength * z
-                    n0 = mass * (_at(motion, 2, index, position + left)
-                                 + _seen(now, 4, real, imaginary, pairs))
+                    _, _, ae = _between(motion, index, position + left)
+                    n0 = mass * (ae + _seen(now, 4, real, imaginary, pairs))
                     sticks = abs(n0 - smooth) <= level
                     if sticks:
                         _add(real, imaginary, -v0, of_velocity)

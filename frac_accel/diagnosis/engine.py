@@ -102,7 +102,7 @@ class Engine:
             for cause in best.effects:
                 if cause in self.search.base:
                     continue
-                less = self.search.without(best, cause)
+                less = self.search.without(best, cause, best.cost + self.threshold(best))
                 self.search.fit_all([{**less.effects, rival: begin} for _, rival, begin in
                                      self.search.screen(less)[:_RIVALS] if rival != cause]
                                     + [best.effects])

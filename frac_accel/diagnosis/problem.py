@@ -90,6 +90,8 @@ class Fitted:
         Whether steps and iterations were spared.
     exact : bool
         Whether derivatives leave nothing out.
+    trust : float
+        How much of what it promised the last step has gained; 1 before the first.
     """
 
     problem: "Problem"
@@ -99,6 +101,7 @@ class Fitted:
     settled: bool = False
     rough: bool = False
     exact: bool = False
+    trust: float = 1.0
 
     effects = property(lambda self: self.point.effects)
     simulated = property(lambda self: self.point.simulated)
@@ -290,7 +293,7 @@ class Problem:
         part.__dict__.update(self.__dict__, used=used, _columns={})
         return part
 
-    def fit(self, effects, iterations=_ITERATIONS, rough=False, hopeless=np.inf):
+    def fit(self, effects, iterations=_ITERATIONS, rough=False, hopeless=np.inf, goal=np.inf):
         """Parameters of these causes that describe the record best, found from those given.
 
         Parameters
@@ -301,6 +304,8 @@ class Problem:
             With as few steps of a nonlinear core as derivatives need.
         hopeless : float
             Cost above which a fit ends that an iteration does not improve by half.
+        goal : float
+            Cost that a fit must come to at its pace, once it is finished, or it ends.
 
         Returns
         -------
@@ -311,65 +316,69 @@ class Problem:
         theta = np.array([_to_theta(getattr(effects[u.cause], u.name), u) for u in unknowns])
         point = self._point(dict(effects), rough)
         return self._improved(Fitted(self, point, unknowns, theta, rough=rough), iterations,
-                              hopeless)
+                              hopeless, goal)
 
     def finished(self, fit, hopeless=np.inf, goal=np.inf):
-        """A rough fit with the steps and iterations that it was spared.
-
-        It ends, too, where its pace would not take it to a `goal` (a cost).
-        """
-        finer = Fitted(self, self._point(fit.effects, False), fit.unknowns, fit.theta,
-                       exact=fit.exact)
+        """A rough fit with the steps and iterations that it was spared; see `fit`."""
+        finer = dataclasses.replace(fit, point=self._point(fit.effects, False), rough=False)
         finer.jacobian = fit.jacobian
         return self._improved(finer, _ITERATIONS, hopeless, goal)
 
-    def _improved(self, here, iterations, hopeless, goal=np.inf):
+    def _improved(self, here, iterations, hopeless, goal):
         """A fit with more iterations."""
         damping, here.settled = 0.0, not here.unknowns
-        spared = len({*map(acts_on_spring, here.effects.values())}) > 1
-        low, high = np.array([(u.low, u.high) for u in here.unknowns]).reshape(-1, 2).T
+        to_come = _ITERATIONS if here.rough else 0
         for left in reversed(range(iterations if here.unknowns else 0)):
-            gram, slope = _normal(here)
             small = _SMALL_GAIN * here.cost / self.count
-            there = None
-            for _ in range(_TRIES):
-                step = _step(gram, slope, damping, np.maximum(low - here.theta, -1.0),
-                             np.minimum(high - here.theta, 1.0))
-                promised = 2 * step @ slope - step @ gram @ step
-                if promised < small:
-                    here.settled = damping < 1e-2
-                    break
-                theta = np.clip(here.theta + step, low, high)
-                try:
-                    there = self._point(self.replaced(here.effects, here.unknowns, theta),
-                                        here.rough)
-                except FracAccelError:
-                    there = None
-                if there is not None and there.cost < here.cost:
-                    break
-                there = None
-                if spared and not here.exact:
-                    here = dataclasses.replace(here, exact=True)
-                    gram, slope = _normal(here)
-                    continue
-                if promised < here.cost / self.count:
-                    break  # of no more use than one sample
-                damping = max(10 * damping, 1e-3)
+            needed = (here.cost - goal) / (left + 1 + to_come)
+            here, there, damping = self._tried(here, damping, small, needed)
             if there is None:
                 break
-            gained, went = here.cost - there.cost, theta - here.theta
-            kept = gained / (2 * went @ slope - went @ gram @ went)
-            here = Fitted(self, there, here.unknowns, theta, gained < small and damping < 1e-2,
-                          here.rough, here.exact)
+            gained = here.cost - there.cost
+            there.settled = gained < small and damping < 1e-2
             # where the parabola promises too much, a longer step would only be refused
-            if kept > 0.75:
+            if there.trust > 0.75:
                 damping = damping / 10 if damping > 1e-6 else 0.0
-            elif kept < 0.25:
+            elif there.trust < 0.25:
                 damping = max(2 * damping, 1e-3)
-            if gained < (here.cost if here.cost > hopeless else small) \
-                    or here.cost - left * gained > goal:
+            here = there
+            if gained < (here.cost if here.cost > hopeless else small):
                 break
         return here
+
+    def _tried(self, here, damping, small, needed):
+        """A fit; the same one step better, or None; and the damping that the step took.
+
+        There is none where it promises less than a `small` gain, or, as far as such promises can
+        be trusted, less than the `needed` one.
+        """
+        spared = len({*map(acts_on_spring, here.effects.values())}) > 1
+        low, high = np.array([(u.low, u.high) for u in here.unknowns]).T
+        for _ in range(_TRIES):
+            gram, slope = _normal(here)
+            step = _step(gram, slope, damping, np.maximum(low - here.theta, -1.0),
+                         np.minimum(high - here.theta, 1.0))
+            promised = 2 * step @ slope - step @ gram @ step
+            if promised < small or here.trust * promised < needed:
+                here.settled = promised < small and damping < 1e-2
+                break
+            theta = np.clip(here.theta + step, low, high)
+            try:
+                point = self._point(self.replaced(here.effects, here.unknowns, theta), here.rough)
+            except FracAccelError:
+                point = None
+            if point is not None and point.cost < here.cost:
+                went = theta - here.theta
+                trust = (here.cost - point.cost) / (2 * went @ slope - went @ gram @ went)
+                there = dataclasses.replace(here, point=point, theta=theta, trust=min(trust, 1.0))
+                return here, there, damping
+            if spared and not here.exact:
+                here = dataclasses.replace(here, exact=True)
+                continue
+            if promised < here.cost / self.count:
+                break  # of no more use than one sample
+            damping = max(10 * damping, 1e-3)
+        return here, None, damping
 
     def _point(self, effects, rough):
         """`Point` with these parameters; raises FracAccelError where the motion has no bound."""
@@ -404,8 +413,8 @@ class Problem:
                 try:
                     new = self.replaced(point.effects, fit.unknowns, moved)
                     effect = new[unknown.cause]
-                    if forced and (effect.stage == CROSS_AXIS
-                                   or not (fit.exact or acts_on_spring(effect))):
+                    if forced and (effect.stage == CROSS_AXIS or not (
+                            fit.exact or effect.stage > CORE or acts_on_spring(effect))):
                         change = self.change(point.effects, unknown.cause, effect)
                     else:
                         # with forces, what comes across stays as it is: a few per cent of a column

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..effects import known_effects
 from ..errors import FracAccelError
+from .problem import acts_on_spring
 
 _BEAM = 3
 # Factors within which a finite change can be had by a nearby start.
@@ -63,26 +64,34 @@ class Search:
         self.fits[fit.causes] = fit
         self.log(f"fit {sorted(fit.causes - set(self.base))}: {fit.cost:.6g}")
 
-    def fit_all(self, sets, best=np.inf):
-        """Fitted sets by cost; those that fall far behind (a cost) are not fitted to the end."""
+    def fit_all(self, sets, best=np.inf, goal=np.inf):
+        """Fitted sets by cost; none of those that fall far behind (a cost) is fitted to the end.
+
+        Nor are those whose pace would not take them to a `goal` (a cost) or near the best.
+        """
         trials = {}
         for effects in sets:
             key = frozenset(effects)
             try:
+                # a linear motion is cheap enough to be tried in any case
+                costly = any(map(acts_on_spring, effects.values()))
                 trials[key] = self.fits.get(key) or self.problem.fit(
-                    effects, _TRIAL, rough=True, hopeless=_HOPELESS * best)
+                    effects, _TRIAL, True, _HOPELESS * best,
+                    min(goal, self._near(best)) if costly else np.inf)
             except FracAccelError:
                 continue  # a motion without bound describes no record
             best = min(best, trials[key].cost)
-        goal = np.inf
         for key, trial in sorted(trials.items(), key=lambda entry: entry[1].cost):
             if trial.rough and trial.cost <= _HOPELESS * best:
                 trial = self.problem.finished(trial, _BEHIND * best, goal)
                 best = min(best, trial.cost)
-            goal = min(goal, (1 + _NEAR / self.problem.count) * trial.cost)
+            goal = min(goal, self._near(trial.cost))
             if trial is not self.fits.get(key):
                 self._keep(trial)
         return sorted((self.fits[key] for key in trials), key=lambda fit: fit.cost)
+
+    def _near(self, cost):
+        return (1 + _NEAR / self.problem.count) * cost
 
     def view(self, fitted):
         p = self.problem
@@ -179,7 +188,8 @@ class Search:
             fits = self.fit_all([effects for _, effects in chosen])
             if not fits or best.cost - fits[0].cost < threshold(best):
                 break
-            gained, best, beam = 1 - fits[0].cost / best.cost, fits[0], fits[:_BEAM]
+            gained, best = 1 - fits[0].cost / best.cost, fits[0]
+            beam = [fit for fit in fits[:_BEAM] if fit.cost <= _HOPELESS * best.cost]
             if added >= 2 and gained < _STUCK and not done(best):
                 break
         return self.prune(best, threshold)
@@ -187,17 +197,18 @@ class Search:
     def prune(self, best, threshold):
         """Leave out causes without which the record is described as well."""
         while True:
-            smaller = [self.without(best, cause)
+            goal = best.cost + threshold(best)
+            smaller = [self.without(best, cause, goal)
                        for cause in best.effects if cause not in self.base]
-            smaller = [fit for fit in smaller if fit.cost - best.cost < threshold(best)]
+            smaller = [fit for fit in smaller if fit.cost < goal]
             if not smaller:
                 return best
             best = min(smaller, key=lambda fit: fit.cost)
 
-    def without(self, fitted, cause):
-        """The same set without one cause, fitted anew."""
+    def without(self, fitted, cause, goal=np.inf):
+        """The same set without one cause, fitted anew; not to the end if no pace to a goal."""
         less = {name: effect for name, effect in fitted.effects.items() if name != cause}
-        return next(iter(self.fit_all([less], fitted.cost)), None) or self.fit(less)
+        return next(iter(self.fit_all([less], fitted.cost, goal)), None) or self.fit(less)
 
 
 def _orthonormal(columns):
