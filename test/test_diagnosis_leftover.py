@@ -23,10 +23,10 @@ def signal(rng, kind):
     return noise
 
 
-def judge(residual, values):
+def judge(residual, values, step=None):
     used = np.ones(N, bool)
     used[:64] = used[-64:] = False
-    return leftover(residual * used, values, used)
+    return leftover(residual * used, values, used, step=step)
 
 
 @pytest.mark.parametrize("kind", ["noise", "periods", "bursts", "shock"])
@@ -54,6 +54,23 @@ def test_what_follows_the_signal_is_not_noise(kind, effect):
         noise = rng.normal(size=N) * np.std(extra) / 3
         found = judge(extra + noise, values)
         assert found.share > 0.5, seed
+
+
+@pytest.mark.parametrize("kind", ["noise", "periods", "bursts"])
+def test_rounding_is_no_more_than_the_lattice_makes_it(kind):
+    followed = 0
+    for seed in range(20):
+        rng = np.random.default_rng([seed, len(kind)])
+        values = signal(rng, kind)
+        step = rng.uniform(0.3, 3) * np.std(values)
+        noisy = values + rng.uniform(0.02, 0.3) * step * rng.normal(size=N)
+        rounded = step * np.round(noisy / step)
+        followed += judge(rounded - values, values).share > 0
+        assert judge(rounded - values, values, step).share == 0, seed
+        # what is wrong besides shows through the rounding
+        delayed = step * np.round((noisy + lfilter([0, 0.5], [1, -0.8], values)) / step)
+        assert judge(delayed - values, values, step).share > 0.3, seed
+    assert followed > 5  # as if it were another effect
 
 
 def test_residual_of_a_shock_is_not_noise():

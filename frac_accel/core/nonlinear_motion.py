@@ -276,6 +276,12 @@ def _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameter
 
 
 @_exact
+def _slip_in_part(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameters):
+    """`_slip` where it is not worth its place in the loop."""
+    return _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameters)
+
+
+@_exact
 def _stick(free, sums, n0, mass):
     """Force in the middle and at the end of a step that keeps the acceleration at zero."""
     matrix = np.empty((2, 2))
@@ -467,8 +473,8 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                 friction = level * slip
                 z0 = z
                 nextm, nexte = _beyond(last, nm, ne)
-                nm, ne, z = _slip(free, s, step * left, n0, q0, v0, z0, nextm, nexte, friction,
-                                  terms, parameters)
+                nm, ne, z = _slip_in_part(free, s, step * left, n0, q0, v0, z0, nextm, nexte,
+                                          friction, terms, parameters)
                 vm = _motion(free, s, 0, 1, n0, nm, ne)
                 ve = _motion(free, s, 1, 1, n0, nm, ne)
                 changes = (vm * slip < 0 or ve * slip < 0) and split < _SPLITS - 1
@@ -489,10 +495,10 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                         _prepare(step * left, poles, residues, pairs, r, g, s)
                         _look_at_part(r, real, imaginary, pairs, motion, index, position, left,
                                       free)
-                        nm, ne, z = _slip(free, s, step * left, n0, q0, v0, z0,
-                                          _parabola(n0, wholem, wholee, share / 2),
-                                          _parabola(n0, wholem, wholee, share),
-                                          friction, terms, parameters)
+                        nm, ne, z = _slip_in_part(free, s, step * left, n0, q0, v0, z0,
+                                                  _parabola(n0, wholem, wholee, share / 2),
+                                                  _parabola(n0, wholem, wholee, share),
+                                                  friction, terms, parameters)
                         vm = _motion(free, s, 0, 1, n0, nm, ne)
                         ve = _motion(free, s, 1, 1, n0, nm, ne)
                         slope = (v0 - 4 * vm + 3 * ve) / share

@@ -101,7 +101,7 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     engine = Engine(record, column, model, used,
                     {cause: entry.effect for cause, entry in loose.items()},
                     [cause for cause, effect in known_effects().items()
-                     if not effect.read_off], progress)
+                     if not effect.read_off], progress, found.step)
     _require_relation(engine, axis, seed)
     return judge(engine, engine.run(seed), found, fixed, loose, source[1])
 

@@ -28,6 +28,8 @@ _QUIET_END = 0.5
 _STRETCHES = 20
 # Parts of the record in which a cause's strength is compared.
 _PARTS = 5
+# Share of the residual's power for which a coarse lattice must account.
+_COARSE = 0.2
 
 
 def noise_peak(residual, used):
@@ -51,10 +53,14 @@ def held_out(reference):
 
 
 class Engine:
-    """Search, competition and judgement for one record."""
+    """Search, competition and judgement for one record.
 
-    def __init__(self, record, axis, baseline, used, base=None, candidates=(), log=None):
+    The measured values may have a lattice with a known `step`.
+    """
+
+    def __init__(self, record, axis, baseline, used, base=None, candidates=(), log=None, step=None):
         self.problem = Problem(record, axis, baseline, used)
+        self._step = step
         self._wanted = used
         self.search = Search(self.problem, base, candidates, log)
         self.held_out_rows = used & self.problem.used & held_out(record.reference[:, axis])
@@ -86,7 +92,8 @@ class Engine:
             # where the motion is strongest is enough to find most causes
             part = strongest_stretch(p.record.reference[:, p.axis], _LONG // 2)
             found = Engine(p.record.part(part), p.axis, p.baseline, self._wanted[part],
-                           self.search.base, self.search.candidates, self.search.log).run(seed)
+                           self.search.base, self.search.candidates, self.search.log,
+                           self._step).run(seed)
             seed = {cause: effect for cause, effect in found.effects.items()
                     if cause not in self.search.base}
             return self.search.run(self.threshold, self.noise_only, seed, most=1)
@@ -151,13 +158,18 @@ class Engine:
             self._learnt[fitted.causes] = part.fit(fitted.effects, iterations=6)
         return self._learnt[fitted.causes]
 
-    def held_out(self, best, cause, step=None):
+    def coarse_step(self, fitted):
+        """Step of the values' lattice where that accounts for much of a residual, or None."""
+        much = self._step and self._step**2 / 12 > _COARSE * fitted.cost / self.problem.count
+        return self._step if much else None
+
+    def held_out(self, best, cause):
         """Gain of a fitted cause on the part of the record that its fit has not seen.
 
-        With the `step` of a coarse lattice the simulated values are put on it too: what rounding
-        does to small signals is no other cause's merit.
+        On a coarse lattice the simulated values are put on it too: what rounding does to small
+        signals is no other cause's merit.
         """
-        errors = []
+        errors, step = [], self.coarse_step(best)
         for fit in (self.search.without(best, cause), best):
             simulated = self.learnt(fit).simulated
             if step:
@@ -194,4 +206,5 @@ class Engine:
         p = self.problem
         across = [signal for axis, signal in enumerate(p.record.reference.T)
                   if axis != p.axis and np.ptp(signal)]
-        return leftover(fitted.residual, fitted.simulated, p.used, across)
+        return leftover(fitted.residual, fitted.simulated, p.used, across,
+                        self.coarse_step(fitted))

@@ -25,8 +25,6 @@ _RELEVANT = 0.005
 _CLEAR = 10.0
 # Standard uncertainties from the model's own value by which a parameter has moved.
 _MOVED = 5.0
-# Share of the residual's power that the lattice must account for.
-_COARSE = 0.2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -161,8 +159,7 @@ def judge(engine, best, found, fixed, loose, sensor):
     base = engine.search.base
     gains = {}
     while True:
-        step = found.step if _coarse(engine, best, found) else None
-        gains = {cause: engine.held_out(best, cause, step)
+        gains = {cause: engine.held_out(best, cause)
                  for cause in best.effects if cause not in base}
         idle = [cause for cause, g in gains.items()
                 if g.reduction < _RELEVANT or g.ci95[0] <= 0]
@@ -309,7 +306,7 @@ def _read_off(engine, best, found, fixed, sensor):
             (p.measured - simulated)[rows],
             (p.measured - np.clip(simulated, limits.lower, limits.upper))[rows],
             "; ".join(words for words in found.words if "limit" in words))
-    if _coarse(engine, best, found):
+    if engine.coarse_step(best):
         coarse = found.step * np.round(simulated / found.step)
         free = rows & p.used
         add(known["quantization"](found.step), {"step": 1e-6 * found.step},
@@ -334,11 +331,6 @@ def _read_off(engine, best, found, fixed, sensor):
             (p.measured - simulated)[counted][late],
             next(words for words in found.words if "missing" in words))
     return findings
-
-
-def _coarse(engine, best, found):
-    """Whether the lattice of the values accounts for much of the residual."""
-    return bool(found.step) and found.step**2 / 12 > _COARSE * best.cost / engine.problem.count
 
 
 def _at_stamps(simulated, record, sensor):

@@ -23,6 +23,11 @@ _RELATED = 8.0
 # the best of all lags; more than the other is always enough.
 _CHANCE = 12.0
 _ALWAYS = 0.5
+# Times that rounding is simulated, factor by which its largest share and score may be exceeded, and
+# halvings of the range of the noise before it.
+_ROUNDINGS = 3
+_SCATTER = 1.2
+_HALVINGS = 12
 # Standard deviations of the statistic under independence by which a residual is no noise.
 _SIGNIFICANT = 6.0
 
@@ -63,7 +68,7 @@ class Leftover:
         return self.rms * np.sqrt(max(1 - self.share, 0.0))
 
 
-def leftover(residual, simulated, used, across=()):
+def leftover(residual, simulated, used, across=(), step=None):
     """Judge a residual.
 
     Parameters
@@ -74,11 +79,44 @@ def leftover(residual, simulated, used, across=()):
     used : ndarray of bool, shape (n,)
     across : sequence of ndarray, shape (n,)
         Accelerations along the other axes.
+    step : float, optional
+        Lattice of the measured values [output units]. What rounding makes of the simulated ones,
+        with as much noise as the residual's size asks for, is taken off all shares and scores: on a
+        coarse lattice it follows the motion.
 
     Returns
     -------
     Leftover
     """
+    found = _leftover(residual, simulated, used, across)
+    if not step:
+        return found
+    expected = [_leftover(error, simulated, used, across)
+                for error in _rounding_errors(residual, simulated, used, step)]
+    linear, level, linear_score, level_score = _SCATTER * np.max([
+        (max(e.linear, 0), e.level, max(e.linear_score, 0), max(e.level_score, 0))
+        for e in expected], axis=0)
+    return Leftover(found.rms, max(found.linear - linear, 0.0), max(found.level - level, 0.0),
+                    found.linear_score - linear_score, found.level_score - level_score)
+
+
+def _rounding_errors(residual, simulated, used, step):
+    """Errors that rounding leaves of noisy simulated values, as large as the residual."""
+    size = np.sqrt(np.mean(residual[used]**2))
+    for seed in range(_ROUNDINGS):
+        noise = size * np.random.default_rng(seed).standard_normal(len(simulated))
+        low, high = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            share = (low + high) / 2
+            error = step * np.round((simulated + share * noise) / step) - simulated
+            if np.mean(error[used]**2) < size**2:
+                low = share
+            else:
+                high = share
+        yield error * used
+
+
+def _leftover(residual, simulated, used, across):
     rng = np.random.default_rng(0)
     rms = float(np.sqrt(np.mean(residual[used]**2)))
     linear, linear_score = max((_linear(residual, signal, rng) for signal in

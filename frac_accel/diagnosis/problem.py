@@ -305,7 +305,8 @@ class Problem:
         hopeless : float
             Cost above which a fit ends that an iteration does not improve by half.
         goal : float
-            Cost that a fit must come to at its pace, once it is finished, or it ends.
+            Cost that a fit must come to at its pace, once it is finished, or it ends. Gains are
+            taken to shrink evenly to nothing in the iterations to come.
 
         Returns
         -------
@@ -320,7 +321,8 @@ class Problem:
 
     def finished(self, fit, hopeless=np.inf, goal=np.inf):
         """A rough fit with the steps and iterations that it was spared; see `fit`."""
-        finer = dataclasses.replace(fit, point=self._point(fit.effects, False), rough=False)
+        finer = dataclasses.replace(fit, point=self._point(fit.effects, False), rough=False,
+                                    trust=1.0 if fit.settled else fit.trust)
         finer.jacobian = fit.jacobian
         return self._improved(finer, _ITERATIONS, hopeless, goal)
 
@@ -330,7 +332,7 @@ class Problem:
         to_come = _ITERATIONS if here.rough else 0
         for left in reversed(range(iterations if here.unknowns else 0)):
             small = _SMALL_GAIN * here.cost / self.count
-            needed = (here.cost - goal) / (left + 1 + to_come)
+            needed = 2 * (here.cost - goal) / (left + 1 + to_come)
             here, there, damping = self._tried(here, damping, small, needed)
             if there is None:
                 break
