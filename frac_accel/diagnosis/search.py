@@ -144,9 +144,7 @@ class Search:
         if size <= 1e-24 * cost:
             return None
         factor = shared / size
-        if start.kind == "positive" and factor <= 0:
-            return None
-        if start.kind == "weak" and factor <= 0:
+        if start.kind in ("positive", "weak") and factor <= 0:
             return None
         if start.kind in ("finite", "weak"):
             factor = np.clip(factor, _REACH[0] if start.kind == "finite" else 0.0, _REACH[1])
