@@ -99,3 +99,16 @@ def test_friction_that_an_identified_model_took_for_damping_is_no_hysteresis(see
     found = frac_accel.diagnose((reference, sensor), temperature=celsius)
     assert {finding.cause for finding in found.findings} <= {"coulomb_friction",
                                                              "core_parameter_shift"}
+
+
+@pytest.mark.parametrize("seed", range(60, 66))
+def test_motion_from_before_the_record_goes_on_into_held_out_samples(seed):
+    """A slow high-pass still falls off from where it was when the record began."""
+    case = draw_case(seed, ["ac_coupling"], times_noise=np.exp(
+        np.random.default_rng(seed).uniform(np.log(2), np.log(50))))
+    reference, sensor, celsius = case.samples()
+    found = frac_accel.diagnose((reference, sensor), model=case.model(), temperature=celsius)
+    assert [finding.cause for finding in found.findings] == ["ac_coupling"]
+    engine, rows = found.engine, found.engine.held_out_rows
+    error = (engine.problem.measured - engine.learnt(found.best).output)[rows]
+    assert np.sqrt(np.mean(error**2)) < 1.05 * case.noise_std

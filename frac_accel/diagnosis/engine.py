@@ -171,10 +171,10 @@ class Engine:
         """
         errors, step = [], self.coarse_step(best)
         for fit in (self.search.without(best, cause), best):
-            simulated = self.learnt(fit).simulated
+            output = self.learnt(fit).output
             if step:
-                simulated = step * np.round(simulated / step)
-            errors.append((self.problem.measured - simulated)[self.held_out_rows])
+                output = step * np.round(output / step)
+            errors.append((self.problem.measured - output)[self.held_out_rows])
         return gain(*errors)
 
     def unsteadiness(self, best, cause):

@@ -197,8 +197,8 @@ def _verdict(engine, best, left, findings, suspects, found):
     measured = p.measured[rest]
     spread = float(np.std(measured))
     baseline = engine.search.fit(engine.search.base)
-    errors = {"baseline": _rms(p.measured - baseline.simulated, rest),
-              "extended": _rms(p.measured - engine.learnt(best).simulated, rest)}
+    errors = {"baseline": _rms(p.measured - baseline.output, rest),
+              "extended": _rms(p.measured - engine.learnt(best).output, rest)}
     noise = left.noise_rms
     excess = max(baseline.cost / p.count - noise**2, 0.0)
     remains = max(best.cost / p.count - noise**2, 0.0)
@@ -225,7 +225,7 @@ def _verdict(engine, best, left, findings, suspects, found):
     model = _extended(engine, kept)
     if named != {c for c in best.effects if c not in engine.search.base}:
         fitted = engine.search.fit({c: e for c, e in kept.items() if c in best.effects})
-        errors["extended"] = _rms(p.measured - engine.learnt(fitted).simulated, rest)
+        errors["extended"] = _rms(p.measured - engine.learnt(fitted).output, rest)
         remains = max(fitted.cost / p.count - noise**2, 0.0)
         fraction = remains / excess if excess > 0 else 0.0
     return Diagnosis(
@@ -274,10 +274,10 @@ def _moved(engine, best, loose, stds):
                        for name, std in entry.std.items())
         if farthest < _MOVED:
             continue
-        held = engine.problem.simulate({**best.effects, cause: entry.effect})
         rows = engine.held_out_rows
-        measured = engine.problem.measured
-        g = gain((measured - held)[rows], (measured - best.simulated)[rows])
+        error = (engine.problem.measured - best.output)[rows]
+        held = engine.problem.simulate({**best.effects, cause: entry.effect})
+        g = gain(error + (best.simulated - held)[rows], error)
         if g.ci95[0] > 0 and g.reduction > _RELEVANT:
             findings.append(Finding(effect, stds[cause], 0.999, [], [
                 f"{farthest:.3g} standard uncertainties from what the model allows for",
@@ -291,7 +291,7 @@ def _read_off(engine, best, found, fixed, sensor):
     # clipped samples count here, and nothing was fitted: all samples do
     rows = p.record.valid.copy()
     rows[:64] = rows[-64:] = False
-    simulated, findings = best.simulated, []
+    output, findings = best.output, []
 
     def add(effect, std, before, after, evidence):
         g = gain(before, after)
@@ -303,22 +303,22 @@ def _read_off(engine, best, found, fixed, sensor):
         limits = fixed["clipping"]
         resolution = (found.step or 0.0) / np.sqrt(12)
         add(limits, {"lower": resolution, "upper": resolution},
-            (p.measured - simulated)[rows],
-            (p.measured - np.clip(simulated, limits.lower, limits.upper))[rows],
+            (p.measured - output)[rows],
+            (p.measured - np.clip(output, limits.lower, limits.upper))[rows],
             "; ".join(words for words in found.words if "limit" in words))
     if engine.coarse_step(best):
-        coarse = found.step * np.round(simulated / found.step)
+        coarse = found.step * np.round(output / found.step)
         free = rows & p.used
         add(known["quantization"](found.step), {"step": 1e-6 * found.step},
-            (p.measured - simulated)[free], (p.measured - coarse)[free],
+            (p.measured - output)[free], (p.measured - coarse)[free],
             next(words for words in found.words if "multiples" in words))
     if found.jitter_rms_s:
-        slot, values = _at_stamps(simulated, p.record, sensor)
+        slot, values = _at_stamps(output, p.record, sensor)
         inside = rows[slot] & p.used[slot]
         slot, values = slot[inside], values[inside]
         add(known["timestamp_jitter"](found.jitter_rms_s),
             {"rms_s": found.jitter_rms_s / np.sqrt(2 * found.samples)},
-            p.measured[slot] - values, p.measured[slot] - simulated[slot],
+            p.measured[slot] - values, p.measured[slot] - output[slot],
             next(words for words in found.words if "scatter" in words))
     if found.missing:
         counted = np.flatnonzero(p.record.valid)
@@ -327,8 +327,8 @@ def _read_off(engine, best, found, fixed, sensor):
         fraction = found.dropped_fraction
         add(known["dropped_samples"](fraction),
             {"fraction": np.sqrt(fraction * (1 - fraction) / (found.samples + found.missing))},
-            (p.measured[counted] - simulated[here])[late],
-            (p.measured - simulated)[counted][late],
+            (p.measured[counted] - output[here])[late],
+            (p.measured - output)[counted][late],
             next(words for words in found.words if "missing" in words))
     return findings
 

@@ -55,7 +55,7 @@ class Point(NamedTuple):
     simulated : ndarray, shape (n,)
         Output with them, without what the time before the record may have left.
     columns, free : ndarray, shape (n, m)
-        Free motions that this may be, and an orthonormal basis of them.
+        Free motions that this may be, and an orthonormal basis of them where samples count.
     left : ndarray, shape (m,)
         Size of each column in the record.
     residual : ndarray, shape (n,)
@@ -105,6 +105,7 @@ class Fitted:
 
     effects = property(lambda self: self.point.effects)
     simulated = property(lambda self: self.point.simulated)
+    output = property(lambda self: self.simulated + self.point.columns @ self.point.left)
     free = property(lambda self: self.point.free)
     residual = property(lambda self: self.point.residual)
     cost = property(lambda self: self.point.cost)
@@ -246,7 +247,7 @@ class Problem:
         return self._last[1]
 
     def free_columns(self, effects):
-        """What the time before the record may have left, shape (n, m); 0 where none counts."""
+        """What the time before the record may have left, shape (n, m)."""
         model = self.axis_model(effects)
         return kept(self._columns, model.dynamics, self._free_columns, model, most=2)
 
@@ -264,7 +265,7 @@ class Problem:
         """Orthonormal columns, shape (n, m): slow motions that a cause of its own may have left."""
         slow = [pole for pole in np.atleast_1d(effect.poles())
                 if -pole.real * _EDGE < self.rate]
-        return _span(self._decays(slow))[0]
+        return _span(self._decays(slow) * self.used[:, None])[0]
 
     def _decays(self, poles):
         columns = []
@@ -275,8 +276,8 @@ class Problem:
             time = self.time[:1 + int(min(_GONE * self.rate / pole.real, len(self.time)))]
             decay, turn = np.exp(pole.real * time), pole.imag * time
             columns += [decay] if pole.imag == 0 else [decay * np.cos(turn), decay * np.sin(turn)]
-        columns = [column * self.used[:len(column)] for column in columns]
-        columns = [column for column in columns if np.max(np.abs(column)) > 1e-9]
+        columns = [column for column in columns
+                   if np.max(np.abs(column * self.used[:len(column)])) > 1e-9]
         result = np.zeros((len(self.record), len(columns)))
         for i, column in enumerate(columns):
             result[:len(column), i] = column
@@ -388,7 +389,7 @@ class Problem:
         if not np.isfinite(simulated).all():
             raise FracAccelError("the motion has no bound")
         columns = self.free_columns(effects)
-        free, back = _span(columns)
+        free, back = _span(columns * self.used[:, None])
         error = (self.measured - simulated) * self.used
         components = free.T @ error
         residual = error - free @ components
@@ -454,6 +455,7 @@ class Problem:
             low, high = max(lows, default=-np.inf), min(highs, default=np.inf)
             if logarithmic:
                 least, most = self.reach(field.name, scale)
+                most = effect.sought.get(field.name, most)
                 low, high = np.log(least), np.log(min(high, most))
             else:
                 span = 1e-3 if np.isfinite(low) and np.isfinite(high) else 0

@@ -57,6 +57,9 @@ class Effect:
     # True for what is read off a record's stamps and values, and never fitted
     read_off: ClassVar[bool] = False
 
+    # Largest values of parameters that a diagnosis looks for, where others would not be this cause.
+    sought: ClassVar[dict[str, float]] = {}
+
     # Relative changes of parameters for numerical derivatives, where the usual one is too large.
     steps: ClassVar[dict[str, float]] = {}
 

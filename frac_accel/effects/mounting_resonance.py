@@ -23,6 +23,7 @@ class MountingResonance(Effect):
     explanation = "The mounting is a spring: it has a resonance of its own below the sensor."
     experiment = ("Remount the sensor, or change the mounting's stiffness: a resonance of the "
                   "mounting moves with it.")
+    sought = {"damping_ratio": 1.0}  # more is no resonance: it looks like a low-pass
 
     frequency_hz: float = parameter("Hz", above=0)
     damping_ratio: float = parameter("1", above=0, maximum=100)

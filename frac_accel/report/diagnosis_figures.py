@@ -45,10 +45,10 @@ class Compared:
         named = {finding.cause: finding.effect for finding in found.findings}
         fitted = search.fit({cause: effect for cause, effect in found.best.effects.items()
                              if cause in named or cause in search.base})
-        simulated = {_IN_USE: bare.simulated}
+        simulated = {_IN_USE: bare.output}
         residuals = {_IN_USE: bare.residual}
         if named:
-            output, left = fitted.simulated, fitted.residual
+            output, left = fitted.output, fitted.residual
             for effect in named.values():
                 # read off the record, and not among those that were fitted
                 if effect.cause not in fitted.effects:
