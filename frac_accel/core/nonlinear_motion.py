@@ -311,14 +311,12 @@ def _crossing(n0, nm, ne, level):
 
 
 @_exact
-def _turn(speeds, slip):
+def _turn(v0, vm, ve, a0, am, ae, slip):
     """First part of a step after which the velocity is against `slip`.
 
-    speeds (2, 3): velocity at the start, in the middle and at the end; its slopes by the part. The
-    polynomial with all six goes there (Hermite's interpolation by divided differences).
+    By the polynomial with the velocities v0, vm, ve and the slopes a0, am, ae at the start, in the
+    middle and at the end (Hermite's interpolation by divided differences).
     """
-    v0, vm, ve = speeds[0]
-    a0, am, ae = speeds[1]
     first, second = 2 * (vm - v0), 2 * (ve - vm)
     c2 = 2 * (first - a0)
     e2, e3, e4 = 2 * (am - first), 2 * (second - am), 2 * (ae - second)
@@ -409,7 +407,7 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
     rows, gains, sums, now = (np.empty((12, m)), np.empty((6, m)), np.empty((2, 3, 3)),
                               np.empty((6, m)))
     part_rows, part_gains, part_sums = rows.copy(), gains.copy(), sums.copy()
-    free, speeds = np.zeros((2, 3)), np.zeros((2, 3))
+    free = np.zeros((2, 3))
     real, imaginary = np.zeros(m), np.zeros(m)
     _prepare(step, poles, residues, pairs, rows, gains, sums)
     _start(poles, now, real, imaginary, start, of_displacement)
@@ -480,14 +478,12 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                 changes = (vm * slip < 0 or ve * slip < 0) and split < _SPLITS - 1
                 if changes:
                     # the part of the step after which the velocity is zero
-                    _, _, ae = _between(motion, index, position)
-                    speeds[0, 0], speeds[0, 1], speeds[0, 2] = v0, vm, ve
-                    speeds[1, 0] = ae + _seen(now, 4, real, imaginary, pairs) - n0 / mass
-                    speeds[1, 1] = _motion(free, s, 0, 2, n0, nm, ne) - nm / mass
-                    speeds[1, 2] = _motion(free, s, 1, 2, n0, nm, ne) - ne / mass
-                    for i in range(3):
-                        speeds[1, i] *= step * left
-                    share = _turn(speeds, slip)
+                    _, _, a0 = _between(motion, index, position)
+                    a0 += _seen(now, 4, real, imaginary, pairs) - n0 / mass
+                    am = _motion(free, s, 0, 2, n0, nm, ne) - nm / mass
+                    ae = _motion(free, s, 1, 2, n0, nm, ne) - ne / mass
+                    length = step * left
+                    share = _turn(v0, vm, ve, length * a0, length * am, length * ae, slip)
                     r, g, s = part_rows, part_gains, part_sums
                     rest, wholem, wholee = left, nm, ne
                     for _ in range(_TURN_PASSES):

@@ -10,17 +10,12 @@ import multiprocessing
 import sys
 from pathlib import Path
 
-import numpy as np
 from tqdm import tqdm
-
-from frac_accel import SensorModel, simulate
-from frac_accel.core import Oscillator
-from frac_accel.effects import known_effects
 
 from . import score
 from .plan import GROUPS, plan
 from .report import markdown
-from .trial import run
+from .trial import run, warm_up
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -58,13 +53,6 @@ def main():
     page = markdown([rows[key(trial)] for trial in trials], command)
     arguments.output.write_text(page)
     print(f"{arguments.output}: written from {kept}")
-
-
-def warm_up():
-    """Compile what is compiled on a machine's first use, which no diagnosis is to be timed with."""
-    core = Oscillator(100.0, 0.7)
-    for cause in "cubic_stiffness", "coulomb_friction":
-        simulate(SensorModel(core, [known_effects()[cause](1e-3)]), np.eye(1, 256)[0], 1000.0, "x")
 
 
 def key(trial):

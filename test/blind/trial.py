@@ -5,7 +5,17 @@ import time
 import numpy as np
 from rig.hidden import draw_case
 
+from frac_accel import SensorModel, simulate
+from frac_accel.core import Oscillator
+from frac_accel.effects import known_effects
 from frac_accel.errors import FracAccelError
+
+
+def warm_up():
+    """Compile what is compiled on a machine's first use, which no diagnosis is to be timed with."""
+    core = Oscillator(100.0, 0.7)
+    for cause in "cubic_stiffness", "coulomb_friction":
+        simulate(SensorModel(core, [known_effects()[cause](1e-3)]), np.eye(1, 256)[0], 1000.0, "x")
 
 
 def run(trial, diagnose=None):
