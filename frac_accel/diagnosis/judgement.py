@@ -220,14 +220,18 @@ def _verdict(engine, best, left, findings, suspects, found):
         verdict, reason = "partly_explained", "the named causes leave a part unexplained"
     else:
         verdict, reason = "unexplained", "no known cause explains what the model gets wrong"
-    kept = {c: e for c, e in best.effects.items() if c in named or c in engine.search.base}
-    kept.update({f.cause: f.effect for f in findings})
-    model = _extended(engine, kept)
-    if named != {c for c in best.effects if c not in engine.search.base}:
-        fitted = engine.search.fit({c: e for c, e in kept.items() if c in best.effects})
+    fitted = best
+    if not complete:
+        # what is not named is not in the model, and the rest is fitted without it
+        fitted = engine.search.fit({c: e for c, e in best.effects.items()
+                                    if c in named or c in engine.search.base})
+        stds = engine.uncertainties(fitted)
+        findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
+                    if f.cause in fitted.effects else f for f in findings]
         errors["extended"] = _rms(p.measured - engine.learnt(fitted).output, rest)
         remains = max(fitted.cost / p.count - noise**2, 0.0)
         fraction = remains / excess if excess > 0 else 0.0
+    model = _extended(engine, {**fitted.effects, **{f.cause: f.effect for f in findings}})
     return Diagnosis(
         verdict, reason,
         {"rmse": errors["baseline"], "nrmse": errors["baseline"] / spread, "noise_rms": noise},
