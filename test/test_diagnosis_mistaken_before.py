@@ -18,6 +18,8 @@ pytestmark = pytest.mark.long
     (820028, ["ac_coupling", "quantization"]),
     (820032, ["fractional_damping", "quantization"]),
     (820058, ["offset", "quantization"]),
+    # a scatter of 0.06 % of an interval passed for rounding
+    (1000003, ["timestamp_jitter"]),
 ])
 def test_is_named_now(seed, causes):
     case = draw_case(seed, causes)

@@ -9,8 +9,8 @@ from ..pair import clean, slots_of
 # Samples at the extreme value, and their number against the next value's, that are a pile-up.
 _PILE = 5
 _PILE_RATIO = 4
-# Scatter of the stamps [sampling intervals] below which it is rounding.
-_JITTER = 1e-3
+# Scatter of the stamps [sampling intervals] below which it counts as none.
+_JITTER = 2e-4
 _LATTICE_SAMPLES = 20_000
 
 
