@@ -112,3 +112,6 @@ def test_motion_from_before_the_record_goes_on_into_held_out_samples(seed):
     engine, rows = found.engine, found.engine.held_out_rows
     error = (engine.problem.measured - engine.learnt(found.best).output)[rows]
     assert np.sqrt(np.mean(error**2)) < 1.05 * case.noise_std
+    # not backwards, where it would have been the larger, the earlier
+    before = slice(int(np.argmax(engine.problem.used)))
+    assert np.array_equal(found.best.output[before], found.best.simulated[before])

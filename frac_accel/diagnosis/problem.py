@@ -278,9 +278,11 @@ class Problem:
             columns += [decay] if pole.imag == 0 else [decay * np.cos(turn), decay * np.sin(turn)]
         columns = [column for column in columns
                    if np.max(np.abs(column * self.used[:len(column)])) > 1e-9]
+        # before the first sample that counts, they would grow backwards without bound
+        first = int(np.argmax(self.used))
         result = np.zeros((len(self.record), len(columns)))
         for i, column in enumerate(columns):
-            result[:len(column), i] = column
+            result[first:len(column), i] = column[first:]
         return result
 
     def clear(self, values, free):
