@@ -30,8 +30,12 @@ class LiveSimulator(Stream):
     def _design(self, model, sample_rate_hz, **wishes):
         return design_simulator(model, sample_rate_hz, **wishes)
 
+    def _begin(self):
+        super()._begin()
+        self._effects = self._model.live_simulation(self.sample_rate_hz)
+
     def _after(self, values, index, stamps_ns):
-        return self._model.apply_sample_effects(values, self._circumstances(index, stamps_ns))
+        return self._effects(values, self._circumstances(index, stamps_ns))
 
     def _stamps(self, stamps_ns):
         """A clock that runs slow puts the same instant at an earlier stamp."""

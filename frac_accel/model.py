@@ -10,7 +10,7 @@ import yaml
 from .atomic_file import write_text
 from .core import CORES, Arx
 from .core.static_force import StaticForce
-from .effects import Circumstances, Effect, known_effects
+from .effects import Circumstances, Effect, effect_names, effect_of
 from .errors import ModelError
 from .parameters import as_mapping, build, number, parameter_fields, plain
 
@@ -76,7 +76,7 @@ class AxisModel:
     @property
     def dynamics(self):
         """The core and the linear links around it, without pure delays."""
-        return (self.effective_core, *(effect for effect in self.effects if _is_link(effect)))
+        return (self.effective_core, *(effect for effect in self.effects if is_link(effect)))
 
     def transfer_function(self, s):
         """Composite linear response without its pure delay, at complex `s` [rad/s]."""
@@ -170,51 +170,30 @@ class SensorModel:
         model = self.axis(axis)
         return model.transfer_function(s) * np.exp(-s * model.delay_s)
 
-    def apply_sample_effects(self, values, circumstances):
-        """Effects that act on the samples after the core and its links.
-
-        Parameters
-        ----------
-        values : ndarray, shape (n, 3)
-        circumstances : Circumstances
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-        """
-        for effect, by_axis in self._stages:
-            values = effect.simulate_axes(values, by_axis, circumstances)
-        return values
-
-    def remove_sample_effects(self, values, circumstances, variance=None):
-        """Inverse of `apply_sample_effects`.
-
-        Parameters
-        ----------
-        values : ndarray, shape (n, 3)
-        circumstances : Circumstances
-        variance : ndarray, shape (n, 3), optional
-            Variance of the samples' noise; default 0.
-
-        Returns
-        -------
-        values, variance : ndarray, shape (n, 3)
-        """
-        if variance is None:
-            variance = np.zeros_like(values)
-        return _removed(self._stages, values, variance, circumstances)
-
-    def live_inverse(self, sampling_rate_hz):
-        """`remove_sample_effects` for consecutive blocks of one stream at a rate [Hz].
+    def live_simulation(self, sampling_rate_hz):
+        """Effects that act on the samples after the core and its links, on one stream.
 
         Returns
         -------
         callable
-            (values, variance, circumstances) -> (values, variance).
+            (values, circumstances) -> values, of shape (n, 3), for consecutive blocks.
         """
-        stages = [(cause, {axis: effect.live(sampling_rate_hz) for axis, effect in by_axis.items()})
-                  for cause, by_axis in self._stages]
-        return functools.partial(_removed, stages)
+        return functools.partial(_applied, self._live_stages(sampling_rate_hz))
+
+    def live_inverse(self, sampling_rate_hz):
+        """Inverse of `live_simulation`.
+
+        Returns
+        -------
+        callable
+            (values, variance, circumstances) -> (values, variance), all (n, 3), with the variance
+            of the samples' noise (0 where it is not known), for consecutive blocks.
+        """
+        return functools.partial(_removed, self._live_stages(sampling_rate_hz))
+
+    def _live_stages(self, sampling_rate_hz):
+        return [(cause, {axis: effect.live(sampling_rate_hz) for axis, effect in by_axis.items()})
+                for cause, by_axis in self._stages]
 
     @functools.cached_property
     def limits(self):
@@ -320,6 +299,12 @@ class SensorModel:
             raise ModelError(f"{path}: cannot write the model: {error.strerror}") from None
 
 
+def _applied(stages, values, circumstances):
+    for cause, by_axis in stages:
+        values = cause.simulate_axes(values, by_axis, circumstances)
+    return values
+
+
 def _removed(stages, values, variance, circumstances):
     for cause, by_axis in reversed(stages):
         values, variance = cause.invert_axes(values, variance, by_axis, circumstances)
@@ -359,7 +344,7 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def _is_link(effect):
+def is_link(effect):
     """Whether an effect is a linear link (the base class's response is one throughout)."""
     return type(effect).transfer_function is not Effect.transfer_function
 
@@ -429,13 +414,17 @@ def _effects(entries, where):
         place = f"{where}[{i}]"
         entry = dict(_require_mapping(entry, place))
         cause = entry.pop("cause", None)
-        known = known_effects()
+        known = effect_names()
         if not isinstance(cause, str) or cause not in known:
             close = difflib.get_close_matches(str(cause), known, n=1)
             hint = f"; did you mean {close[0]!r}?" if close else ""
             raise ModelError(f"{place}.cause: unknown cause {cause!r}, expected one of "
-                             f"{', '.join(sorted(known))}{hint}")
-        effects.append(build(known[cause], entry, place))
+                             f"{', '.join(known)}{hint}")
+        try:
+            effect = effect_of(cause)
+        except ModelError as error:
+            raise ModelError(f"{place}.cause: {error}") from None
+        effects.append(build(effect, entry, place))
     return tuple(effects)
 
 

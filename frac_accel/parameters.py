@@ -7,7 +7,8 @@ import math
 from .errors import ModelError
 
 
-def parameter(unit, *, above=None, minimum=None, below=None, maximum=None, default=None):
+def parameter(unit, *, above=None, minimum=None, below=None, maximum=None, default=None,
+              null=None, scale=None, reach=None, step=None):
     """Declare a number of a core or an effect.
 
     Parameters
@@ -18,12 +19,62 @@ def parameter(unit, *, above=None, minimum=None, below=None, maximum=None, defau
         Range that the value must lie in (exclusive, inclusive, exclusive, inclusive).
     default : float, optional
         Value where the file gives none; without it the parameter is required.
+    null : float or "core", optional
+        Value with which the cause changes nothing, or that of the same parameter of the core.
+    scale : float, str or tuple, optional
+        What a fit takes for a change of one: a number, the name of one of `Scales`, or a factor and
+        that name. Default: the value that the fit begins with.
+    reach : tuple, optional
+        Smallest and largest value that a diagnosis looks for, times `scale` where that is a name.
+        Default: 1e-9 to 1e9 times the scale for a parameter above 0, otherwise the range.
+    step : float, optional
+        Change for a numerical derivative, relative for a parameter above 0, otherwise in scales.
+        Default 1e-3.
     """
     metadata = {"unit": unit, "above": above, "minimum": minimum, "below": below,
-                "maximum": maximum}
+                "maximum": maximum, "null": null, "scale": scale, "reach": reach, "step": step}
     if default is None:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
+
+
+@dataclasses.dataclass(frozen=True)
+class Scales:
+    """What is small or large in a record.
+
+    Attributes
+    ----------
+    level : float
+        Standard deviation of the sensor's output [output units].
+    rate : float
+        Sampling rate [Hz].
+    duration : float
+        Of the record [s].
+    """
+
+    level: float
+    rate: float
+    duration: float
+
+    per_level = property(lambda self: 1 / self.level)
+    per_level_squared = property(lambda self: 1 / self.level**2)
+    interval = property(lambda self: 1 / self.rate)
+    per_duration = property(lambda self: 1 / self.duration)
+
+    def of(self, field, value):
+        """Change of the parameter of a dataclass field that counts as one, near a value."""
+        scale = field.metadata["scale"]
+        factor, name = scale if isinstance(scale, tuple) else (1.0, scale)
+        if isinstance(name, str):
+            return factor * getattr(self, name)
+        return name if name is not None else abs(value) or 1.0
+
+    def reach(self, field, scale):
+        """Smallest and largest value of a parameter that a diagnosis looks for."""
+        low, high = field.metadata["reach"] or (1e-9, 1e9)
+        unit = scale if field.metadata["reach"] is None \
+            or isinstance(field.metadata["scale"], str) else 1.0
+        return low * unit, high * unit
 
 
 def coefficients():

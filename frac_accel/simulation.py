@@ -72,7 +72,7 @@ def simulate(model, reference, sampling_rate_hz, axis=None, initial="rest", temp
     for i, axis_model in enumerate(model.axes):
         simulator = AxisSimulator(values[:, i], sampling_rate_hz, temperature_c, initial=initial)
         result[:, i] = simulator.respond(axis_model)
-    result = model.apply_sample_effects(result, simulator.circumstances)
+    result = model.live_simulation(sampling_rate_hz)(result, simulator.circumstances)
     return result[:, column] if single else result
 
 
@@ -91,6 +91,8 @@ class AxisSimulator:
         from there.
     initial : {"steady", "rest"}
         Motion before the first sample: its value for ever (gravity), or none.
+    lag_s : float
+        Time [s] by which the output's instants are later than the reference's.
     steps_per_sample : int
         Steps of a nonlinear core in each sampling interval. Half as many leave an error about ten
         times as large.
@@ -110,7 +112,7 @@ class AxisSimulator:
     """
 
     def __init__(self, reference, sampling_rate_hz, temperature_c=None, start_time_s=0.0,
-                 initial="steady", steps_per_sample=_STEPS_PER_SAMPLE):
+                 initial="steady", steps_per_sample=_STEPS_PER_SAMPLE, lag_s=0.0):
         values = np.asarray(reference, float)
         if values.ndim != 1 or not len(values):
             raise FracAccelError(f"reference: shape {values.shape} given, expected (n,)")
@@ -128,6 +130,7 @@ class AxisSimulator:
         self._still = not self._moving.any()
         self._start_time_s = start_time_s
         self._least_steps = steps_per_sample
+        self._lag_s = lag_s
         self._convolution, self._room_s = None, 0.0
         self._transfers, self._motions, self._deviations = {}, {}, {}
         self.circumstances = Circumstances(start_time_s + np.arange(self._n) / self._rate,
@@ -147,7 +150,7 @@ class AxisSimulator:
         """
         values = self.respond(axis_model)
         for effect in axis_model.effects:
-            values = effect.simulate(values, self.circumstances)
+            values = effect.live(self._rate).simulate(values, self.circumstances)
         return values
 
     def respond(self, axis_model):
@@ -158,7 +161,7 @@ class AxisSimulator:
                              f"Hz, the record has {self._rate:g} Hz")
         ratio = axis_model.clock_ratio
         # what the clock is off already at the start is a delay like any other
-        delay_s = axis_model.delay_s - (ratio - 1) * self._start_time_s
+        delay_s = axis_model.delay_s - self._lag_s - (ratio - 1) * self._start_time_s
         result = self._linear(axis_model, delay_s, ratio)
         force = axis_model.static_force
         if force and not (self._still and not self._level):

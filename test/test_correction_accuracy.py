@@ -43,7 +43,7 @@ def errors(sensor, corrector, record, band):
     usable = np.isfinite(reference).all(axis=1)
     model = model_of(sensor)
     shift = round(model.axes[0].delay_s * RATE)
-    offset = model.apply_sample_effects(np.zeros((1, 3)), Circumstances.at_rest(1))
+    offset = model.live_simulation(RATE)(np.zeros((1, 3)), Circumstances.at_rest(1))
     raw = (record.sensor - offset)[shift:]
     raw_reference = record.reference[:len(raw)]
     result = []

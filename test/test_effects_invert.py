@@ -41,9 +41,10 @@ def test_sample_effects_are_undone_to_rounding(seed):
     model = model_of(rig.Sensor(sensor.core, sensor.effects, {"y": {"effects": {
         "offset": {"offset": 3.0}}}}))
     values = rng.normal(size=(500, 3))
-    affected = model.apply_sample_effects(values, Circumstances.at_rest(500))
+    affected = model.live_simulation(RATE)(values, Circumstances.at_rest(500))
     assert np.max(np.abs(affected - values)) > 0.01
-    restored, _ = model.remove_sample_effects(affected, Circumstances.at_rest(500))
+    restored, _ = model.live_inverse(RATE)(affected, np.zeros_like(affected),
+                                              Circumstances.at_rest(500))
     np.testing.assert_allclose(restored, values, atol=1e-13)
 
 
@@ -53,7 +54,7 @@ def test_sample_effects_by_hand():
         "core": {"natural_frequency_hz": 100.0, "damping_ratio": 0.5},
         "axes": {"x": {"effects": [{"cause": "cross_axis_sensitivity", "y": 0.02, "z": -0.01},
                                    {"cause": "offset", "offset": 0.5}]}}})
-    affected = model.apply_sample_effects(np.array([[1.0, 10.0, 100.0]]), Circumstances.at_rest(1))
+    affected = model.live_simulation(RATE)(np.array([[1.0, 10.0, 100.0]]), Circumstances.at_rest(1))
     np.testing.assert_allclose(affected, [[1.0 + 0.2 - 1.0 + 0.5, 10.0, 100.0]])
 
 
@@ -61,7 +62,7 @@ def test_input_is_left_as_it_was():
     model = model_of(rig.draw_sensor(np.random.default_rng(0), RATE, "classical", ON_SAMPLES))
     values = np.ones((5, 3))
     there = Circumstances.at_rest(5)
-    model.remove_sample_effects(model.apply_sample_effects(values, there), there)
+    model.live_inverse(RATE)(model.live_simulation(RATE)(values, there), np.zeros((5, 3)), there)
     np.testing.assert_array_equal(values, np.ones((5, 3)))
 
 
@@ -93,4 +94,4 @@ def test_cross_axis_that_makes_the_axes_one_is_refused():
         "core": {"natural_frequency_hz": 100.0, "damping_ratio": 0.5},
         "effects": [{"cause": "cross_axis_sensitivity", "x": 1.0, "y": 1.0, "z": 1.0}]})
     with pytest.raises(FracAccelError, match="cross_axis_sensitivity"):
-        model.remove_sample_effects(np.zeros((2, 3)), Circumstances.at_rest(2))
+        model.live_inverse(RATE)(np.zeros((2, 3)), np.zeros((2, 3)), Circumstances.at_rest(2))

@@ -25,7 +25,7 @@ def test_white_noise_alone(seed):
     std = 10 ** rng.uniform(-3, 0, 3)
     kernel = Corrector(model, RATE)
     n = 60_000
-    values = model.apply_sample_effects(np.zeros((n, 3)), Circumstances.at_rest(n))
+    values = model.live_simulation(RATE)(np.zeros((n, 3)), Circumstances.at_rest(n))
     values = values + rng.normal(size=(n, 3)) * std
     result = kernel.process(stamps_of(n), values, np.tile(std**2, (n, 1)))
     late = slice(20_000, None)

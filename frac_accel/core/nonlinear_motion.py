@@ -16,10 +16,15 @@ follows from an acceleration of zero.
 This module needs numba; it is imported when a nonlinear model is simulated.
 """
 
+import functools
+import warnings
+
 import numba
 import numpy as np
+from numba import types
 
 from .bouc_wen import follow_one_way
+from .static_force import no_force
 
 _PASSES = 40
 _CONVERGED = 1e-7      # of the force
@@ -63,17 +68,39 @@ def deviation(modes, force, step, motion, start):
         (modes.poles, modes.residues, modes.of_displacement, modes.of_velocity))
     terms = np.array(force.polynomial[::-1], float)
     parameters = np.array([force.friction_level, force.strength, force.beta, force.gamma])
+    laws = _compiled_laws(force.laws)
     middles = _middles(motion)
     if force.friction_level == 0:
-        return _integrate(poles, residues, displacement, pairs, terms, parameters, step, motion,
-                          middles, start)
+        return _integrate(poles, residues, displacement, pairs, terms, parameters, *laws, step,
+                          motion, middles, start)
     return _integrate_with_friction(poles, residues, displacement, velocity, pairs, modes.mass,
-                                    terms, parameters, step, motion, middles, start)
+                                    terms, parameters, *laws, step, motion, middles, start)
 
 
 def derivatives_needed(force):
     """Derivatives of the linear motion that `deviation` needs."""
-    return 2 if force.friction_level != 0 else 1 if force.strength != 0 else 0
+    return 2 if force.friction_level != 0 else 1 if force.strength != 0 or force.laws else 0
+
+
+# functions as arguments are new in numba, and do what is needed
+warnings.simplefilter("ignore", numba.NumbaExperimentalFeatureWarning)
+_LAW = types.UniTuple(types.float64, 2)(*[types.float64] * 6, types.float64[::1])
+
+
+@functools.cache
+def _compiled_law(function):
+    return numba.cfunc(_LAW, cache=True, error_model="numpy")(function)
+
+
+def _compiled_laws(laws):
+    """Functions (at least one), their number, and the parameters of each in a row."""
+    functions = tuple(_compiled_law(law.function) for law in laws)
+    rows = [np.array(law.parameters, float) for law in laws]
+    width = max((len(row) for row in rows), default=1)
+    parameters = np.zeros((max(len(rows), 1), max(width, 1)))
+    for i, row in enumerate(rows):
+        parameters[i, :len(row)] = row
+    return functions or (_compiled_law(no_force),), len(functions), parameters
 
 
 def _middles(motion):
@@ -243,14 +270,26 @@ def _beyond(n0, nm, ne):
 
 
 @_inlined
-def _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameters):
+def _follow_laws(functions, count, constants, states, after, q0, v0, q1, v1, duration):
+    """Sum of the further laws' forces after a part of a step; `after`: their states then."""
+    total = 0.0
+    for i in range(count):
+        force, after[i] = functions[i](q0, v0, states[i], q1, v1, duration, constants[i])
+        total += force
+    return total
+
+
+@_inlined
+def _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameters, functions,
+          count, constants, states):
     """Force in the middle and at the end of a step without a turn, and the hysteresis there.
 
     free (2, 3): q, q', q'' in the middle and at the end without a force in this step; n0, q0, v0,
-    z0: force and motion at the start; nm, ne: a guess.
+    z0: force and motion at the start; nm, ne: a guess; states (3, count): of the further laws at
+    the start, and, as found here, in the middle and at the end.
     """
     strength, beta, gamma = parameters[1], parameters[2], parameters[3]
-    zm, ze, before = z0, z0, 0.0
+    zm, ze, vm, ve, before = z0, z0, v0, v0, 0.0
     for _ in range(_PASSES):
         qm = _motion(free, sums, 0, 0, n0, nm, ne)
         qe = _motion(free, sums, 1, 0, n0, nm, ne)
@@ -265,6 +304,14 @@ def _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameter
                 ze = _follow(zm, qm, vm, qe, ve, length / 2, beta, gamma)
         newm = _power_terms(terms, qm) + strength * zm + friction
         newe = _power_terms(terms, qe) + strength * ze + friction
+        if count:
+            if strength == 0:
+                vm = _motion(free, sums, 0, 1, n0, nm, ne)
+                ve = _motion(free, sums, 1, 1, n0, nm, ne)
+            newm += _follow_laws(functions, count, constants, states[0], states[1], q0, v0, qm, vm,
+                                 length / 2)
+            newe += _follow_laws(functions, count, constants, states[1], states[2], qm, vm, qe, ve,
+                                 length / 2)
         change = abs(newm - nm) + abs(newe - ne)
         nm, ne = newm, newe
         enough = _CONVERGED * (abs(n0) + abs(nm) + abs(ne))
@@ -276,9 +323,11 @@ def _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameter
 
 
 @_exact
-def _slip_in_part(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameters):
+def _slip_in_part(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameters,
+                  functions, count, constants, states):
     """`_slip` where it is not worth its place in the loop."""
-    return _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameters)
+    return _slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameters,
+                 functions, count, constants, states)
 
 
 @_exact
@@ -370,8 +419,8 @@ def _start(poles, now, real, imaginary, start, of_displacement):
 
 
 @_fast
-def _integrate(poles, residues, of_displacement, pairs, terms, parameters, step, motion, middles,
-               start):
+def _integrate(poles, residues, of_displacement, pairs, terms, parameters, functions, count,
+               constants, step, motion, middles, start):
     m = len(poles)
     rows, gains, sums, now = (np.empty((12, m)), np.empty((6, m)), np.empty((2, 3, 3)),
                               np.empty((6, m)))
@@ -383,13 +432,18 @@ def _integrate(poles, residues, of_displacement, pairs, terms, parameters, step,
     result = np.full(motion.shape[1], np.nan)
     result[0] = start
     q0, v0, z = motion[0, 0] + start, motion[1, 0] if orders > 1 else 0.0, 0.0
-    n0 = _power_terms(terms, q0)
+    states = np.zeros((3, len(functions)))
+    n0 = _power_terms(terms, q0) + _follow_laws(functions, count, constants, states[0], states[0],
+                                                q0, v0, q0, v0, 0.0)
     nm, ne = n0, n0
     for index in range(motion.shape[1] - 1):
         _look(rows, real, imaginary, pairs, motion, middles, index, orders, free)
         nextm, nexte = _beyond(n0, nm, ne)
         n0 = ne
-        nm, ne, z = _slip(free, sums, step, n0, q0, v0, z, nextm, nexte, 0.0, terms, parameters)
+        nm, ne, z = _slip(free, sums, step, n0, q0, v0, z, nextm, nexte, 0.0, terms, parameters,
+                          functions, count, constants, states)
+        if count:
+            states[0] = states[2]
         q0 = _motion(free, sums, 1, 0, n0, nm, ne)
         if orders > 1:
             v0 = _motion(free, sums, 1, 1, n0, nm, ne)
@@ -402,7 +456,7 @@ def _integrate(poles, residues, of_displacement, pairs, terms, parameters, step,
 
 @_fast
 def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pairs, mass, terms,
-                             parameters, step, motion, middles, start):
+                             parameters, functions, count, constants, step, motion, middles, start):
     m = len(poles)
     rows, gains, sums, now = (np.empty((12, m)), np.empty((6, m)), np.empty((2, 3, 3)),
                               np.empty((6, m)))
@@ -417,7 +471,9 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
     # a record may start in mid-motion
     q0, v0, z = motion[0, 0] + start, motion[1, 0], 0.0
     slip, sticks = np.sign(v0), v0 == 0
-    n0 = _power_terms(terms, q0) + level * slip
+    states = np.zeros((3, len(functions)))
+    n0 = level * slip + _power_terms(terms, q0) + _follow_laws(
+        functions, count, constants, states[0], states[0], q0, v0, q0, v0, 0.0)
     if sticks:
         n0 = mass * (motion[2, 0] + _seen(now, 4, real, imaginary, pairs))
     last, nm, ne = n0, n0, n0  # force in the last step
@@ -427,11 +483,14 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
             _look(rows, real, imaginary, pairs, motion, middles, index, 2, free)
             wholem, wholee = _beyond(last, nm, ne)
             wholem, wholee, wholez = _slip(free, sums, step, n0, q0, v0, z, wholem, wholee,
-                                           level * slip, terms, parameters)
+                                           level * slip, terms, parameters, functions, count,
+                                           constants, states)
             vm = _motion(free, sums, 0, 1, n0, wholem, wholee)
             ve = _motion(free, sums, 1, 1, n0, wholem, wholee)
             if vm * slip >= 0 and ve * slip >= 0:
                 q0, v0, z = _motion(free, sums, 1, 0, n0, wholem, wholee), ve, wholez
+                if count:
+                    states[0] = states[2]
                 _advance(rows, gains, real, imaginary, pairs, n0, wholem, wholee)
                 last, n0, nm, ne = n0, wholee, wholem, wholee
                 result[index + 1] = q0 - motion[0, index + 1]
@@ -446,7 +505,8 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                 r, g, s = part_rows, part_gains, part_sums
                 _prepare(step * left, poles, residues, pairs, r, g, s)
                 _look_at_part(r, real, imaginary, pairs, motion, index, position, left, free)
-            smooth = _power_terms(terms, q0) + strength * z
+            smooth = _power_terms(terms, q0) + strength * z + _follow_laws(
+                functions, count, constants, states[0], states[1], q0, v0, q0, v0, 0.0)
             changes = False
             if sticks:
                 nm, ne = _stick(free, s, n0, mass)
@@ -472,7 +532,8 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                 z0 = z
                 nextm, nexte = _beyond(last, nm, ne)
                 nm, ne, z = _slip_in_part(free, s, step * left, n0, q0, v0, z0, nextm, nexte,
-                                          friction, terms, parameters)
+                                          friction, terms, parameters, functions, count,
+                                          constants, states)
                 vm = _motion(free, s, 0, 1, n0, nm, ne)
                 ve = _motion(free, s, 1, 1, n0, nm, ne)
                 changes = (vm * slip < 0 or ve * slip < 0) and split < _SPLITS - 1
@@ -494,7 +555,8 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                         nm, ne, z = _slip_in_part(free, s, step * left, n0, q0, v0, z0,
                                                   _parabola(n0, wholem, wholee, share / 2),
                                                   _parabola(n0, wholem, wholee, share),
-                                                  friction, terms, parameters)
+                                                  friction, terms, parameters, functions, count,
+                                                  constants, states)
                         vm = _motion(free, s, 0, 1, n0, nm, ne)
                         ve = _motion(free, s, 1, 1, n0, nm, ne)
                         slope = (v0 - 4 * vm + 3 * ve) / share
@@ -503,10 +565,13 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                         share = min(max(share - ve / slope, 0.1 * share), 1.0)
                 q0 = _motion(free, s, 1, 0, n0, nm, ne)
                 v0 = ve
+                if count:
+                    states[0] = states[2]
                 _advance(r, g, real, imaginary, pairs, n0, nm, ne)
                 last, n0 = n0, ne
                 if changes:
-                    smooth = _power_terms(terms, q0) + strength * z
+                    smooth = _power_terms(terms, q0) + strength * z + _follow_laws(
+                        functions, count, constants, states[0], states[1], q0, 0.0, q0, 0.0, 0.0)
                     _, _, ae = _between(motion, index, position + left)
                     n0 = mass * (ae + _seen(now, 4, real, imaginary, pairs))
                     sticks = abs(n0 - smooth) <= level

@@ -1,10 +1,58 @@
 """What the oscillator's spring does beyond its linear part."""
 
 import dataclasses
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import FracAccelError
+
+
+class ForceLaw(NamedTuple):
+    """A further term of the force, with or without a state of its own.
+
+    Attributes
+    ----------
+    function : callable
+        ``function(q0, v0, state, q1, v1, duration, parameters) -> (force, state)``: force and state
+        at the end of a part of a step in which the mass went from q0 to q1 [output units], with the
+        velocities v0 and v1 by the time tau = omega_0 t at its ends. Plain arithmetic on numbers,
+        without calls of anything but `math`, so that numba compiles it as it stands. The state is 0
+        at the start; with a duration of 0 the function says the force at q1, v1.
+    parameters : tuple of float
+        Handed over as an array.
+    """
+
+    function: Callable
+    parameters: tuple
+
+    def along(self, motion, velocity, duration, state=0.0, before=None):
+        """Force along a motion, shape (n,), and the state after it.
+
+        Parameters
+        ----------
+        motion, velocity : ndarray, shape (n,)
+            q [output units] and its derivative by tau.
+        duration : float
+            Of the step between two of them, in tau.
+        state : float
+            Before the first.
+        before : tuple of float, optional
+            Motion and velocity before the first; default: as there.
+        """
+        parameters = np.array(self.parameters, float)
+        forces = np.empty(len(motion))
+        q0, v0 = before if before is not None else (motion[0], velocity[0])
+        for i, (q, v) in enumerate(zip(motion.tolist(), velocity.tolist())):
+            forces[i], state = self.function(q0, v0, state, q, v, duration, parameters)
+            q0, v0 = q, v
+        return forces, state
+
+
+def no_force(q0, v0, state, q1, v1, duration, parameters):
+    """The law that adds nothing."""
+    return 0.0, 0.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,6 +75,8 @@ class StaticForce:
     strength, beta, gamma : float
         :math:`\lambda` [1] and :math:`\beta, \gamma` [1/(output units)] of the hysteresis:
         R. Bouc (1967) and Y.-K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249-263.
+    laws : tuple of ForceLaw
+        Further terms of :math:`N`.
     """
 
     polynomial: tuple = ()
@@ -34,9 +84,11 @@ class StaticForce:
     strength: float = 0.0
     beta: float = 0.0
     gamma: float = 0.0
+    laws: tuple = ()
 
     def __bool__(self):
-        return any(self.polynomial) or self.friction_level != 0 or self.strength != 0
+        return bool(any(self.polynomial) or self.friction_level != 0 or self.strength != 0
+                    or self.laws)
 
     def with_power(self, power, coefficient):
         """The same with another term `coefficient` * q**`power`, power 2 or more."""
@@ -45,10 +97,14 @@ class StaticForce:
         terms[power - 2] += coefficient
         return dataclasses.replace(self, polynomial=tuple(terms.tolist()))
 
+    def with_law(self, function, *parameters):
+        """The same with a further term; see `ForceLaw`."""
+        return dataclasses.replace(self, laws=(*self.laws, ForceLaw(function, parameters)))
+
     def equilibrium(self, load):
         """Output under a load that has been there for ever: q + sum(alpha_k q**k) = `load`.
 
-        Friction and hysteresis are taken as relaxed.
+        Friction, hysteresis and further terms are taken as relaxed.
 
         Raises
         ------

@@ -142,7 +142,8 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
                         ("lowest_hz", lowest_hz), ("tolerance", tolerance)):
         if value is not None:
             _positive(value, name)
-    model.remove_sample_effects(np.zeros((1, 3)), Circumstances.at_rest(1))  # refuses singular ones
+    zeros = np.zeros((1, 3))
+    model.live_inverse(rate)(zeros, zeros, Circumstances.at_rest(1))  # refuses singular ones
     ratio = _clock_ratio(model)
     bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz, model.band_hz)
              for name, axis in zip(AXES, model.axes)]

@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..effects import IDENTIFIED
 from ..errors import ModelError
 from ..parameters import number
 from .filter import FilterState
@@ -314,7 +315,8 @@ def _changes(uncertain, s, offset_gain, parts):
 
 
 def _offset(axis):
-    return sum(effect.offset for effect in axis.effects if effect.cause == "offset")
+    return sum(effect.offset for effect in axis.effects
+               if isinstance(effect, IDENTIFIED["offset"]))
 
 
 def _principal(changes, constants, shares, unit):

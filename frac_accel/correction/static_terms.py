@@ -49,6 +49,8 @@ class StaticTerms:
     output_noise, velocity_noise : float
         Standard deviation of q, and of half its change over two instants, per standard deviation
         of white noise of the samples.
+    step : float
+        Time between two of the instants, times the natural angular frequency.
     own_noise, common_noise : float
         Square of the noise gain of this path for a force of slope one, and its product with the
         linear filter's.
@@ -61,6 +63,7 @@ class StaticTerms:
     band: ParallelFilter
     output_noise: float
     velocity_noise: float
+    step: float
     own_noise: float
     common_noise: float
     is_coupled: bool
@@ -139,6 +142,8 @@ class StaticTermsDesign:
         return StaticTerms(
             force=self._axis.static_force, phases=phases, band=band, is_coupled=self.is_coupled,
             output_noise=_loudest(fine), velocity_noise=_loudest(change),
+            step=2 * np.pi * self._axis.effective_core.natural_frequency_hz
+            / (POINTS * self._rate),
             own_noise=float(np.sum(own**2)), common_noise=float(np.sum(own * main)))
 
 
@@ -203,6 +208,8 @@ class StaticTermsState:
         self._parts = {part: FilterState(terms.band, steady[:, 0]**part if part in POWERS
                                          else np.zeros(len(level))) for part in parts}
         self._z, self._before = np.zeros(len(level)), steady[:, 0].copy()
+        # state of each further law, and where and how fast the mass was before
+        self._laws = [[(0.0, (start, 0.0)) for start in steady[:, 0]] for _ in terms.force.laws]
         weight = np.abs(terms.band.taps)
         rest = np.zeros(len(level))
         spread = dataclasses.replace(terms.band, taps=weight)
@@ -234,7 +241,7 @@ class StaticTermsState:
         here = q[:, 1:-1]
         force, doubt, parts = self._force(here, (q[:, 2:] - q[:, :-2]) / 2,
                                           q[:, 2:] - 2 * here + q[:, :-2],
-                                          terms.velocity_noise * spread[:, 1:-1])
+                                          spread[:, 1:-1])
         # of the linear noise, this path repeats or cancels a part
         slope = self._slope.process(_slope(terms.force.polynomial, here))[:, ::POINTS]
         added = variance * (2 * slope * terms.common_noise + slope**2 * terms.own_noise)
@@ -243,12 +250,13 @@ class StaticTermsState:
                  for part, state in self._parts.items()]
         return self._band.process(force)[:, ::POINTS], added, parts
 
-    def _force(self, q, change, bend, change_noise):
+    def _force(self, q, change, bend, noise):
         """N at the instants, the standard deviation of what is not known of it, and its `PARTS`.
 
-        change, bend : first and second difference of q; change_noise : the first one's noise.
+        change, bend : first and second difference of q; noise : standard deviation of the samples'.
         """
         force = self._terms.force
+        change_noise = self._terms.velocity_noise * noise
         total = _power_terms(force.polynomial, q)
         doubt, parts = np.zeros_like(q), {}
         if force.friction_level:
@@ -262,7 +270,27 @@ class StaticTermsState:
         if force.strength:
             parts[HYSTERESIS] = self._hysteresis(q)
             total += force.strength * parts[HYSTERESIS]
+        for law, states in zip(force.laws, self._laws):
+            added, unsure = self._follow(law, states, q, change / self._terms.step,
+                                         self._terms.output_noise * noise,
+                                         change_noise / self._terms.step)
+            total += added
+            doubt += unsure
         return total, doubt, parts
+
+    def _follow(self, law, states, q, velocity, q_noise, velocity_noise):
+        """Force of a further law, and how far one that is noisier by its deviation is off it."""
+        forces, unsure = np.zeros((2, *q.shape))
+        for row, (state, before) in enumerate(states):
+            if not q.shape[1]:
+                continue
+            forces[row], after = law.along(q[row], velocity[row], self._terms.step, state, before)
+            if q_noise[row].any():
+                other, _ = law.along(q[row] + q_noise[row], velocity[row] + velocity_noise[row],
+                                     self._terms.step, state, before)
+                unsure[row] = np.abs(other - forces[row])
+            states[row] = after, (q[row, -1], velocity[row, -1])
+        return forces, unsure
 
     def _hysteresis(self, q):
         force = self._terms.force

@@ -15,7 +15,7 @@ from ..pair import Pair
 from ..simulation import AxisSimulator
 from . import integrity
 from .engine import Engine
-from .judgement import Diagnosis, Finding, Loose, insufficient, judge
+from .judgement import Diagnosis, Finding, insufficient, judge
 from .leftover import related
 from .record import Record
 
@@ -73,8 +73,10 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
                             model, found)
     moving, notes = moving_samples(record.reference[:, column], record.sensor[:, column], record)
     found.words.extend(notes)
-    fixed, used = _limits(found, record, column)
-    used &= moving
+    shown = _shown(found, record.sensor[:, column])
+    used = record.valid & moving
+    for effect in shown.values():
+        used &= ~effect.spoiled(record.sensor[:, column])
     split = learning_length(record.reference[:, column])
     for rows, part in ((used[:split], "before"), (used[split:], "after")):
         if rows.sum() < _FEWEST // 4:
@@ -88,79 +90,54 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
             require_excitation(record.reference[:, column], record.sampling_rate_hz, _COEFFICIENTS)
         except IdentificationError as error:
             return insufficient(str(error), model, found)
-        model, loose, seed = _classical(record, axis, used)
+        model, stds, seed = _classical(record, axis, used)
     else:
-        loose = _left_open(model, axis)
-    if found.jitter_rms_s:
-        # the common lag of the stamps is a median of scattered ones
-        std = 1.25 * found.jitter_rms_s / np.sqrt(found.samples)
-        known = loose.get("time_delay")
-        loose["time_delay"] = Loose(
-            known_effects()["time_delay"](model.axis(axis).delay_s),
-            {"delay_s": float(np.hypot(std, known.std["delay_s"] if known else 0.0))})
+        stds = _stated(model, axis)
+    # the common lag of the stamps is a median of scattered ones
+    loose = _left_open(model.axis(axis), stds, 1.25 * found.jitter_rms_s / np.sqrt(found.samples))
     engine = Engine(record, column, model, used,
                     {cause: entry.effect for cause, entry in loose.items()},
                     [cause for cause, effect in known_effects().items()
                      if not effect.read_off], progress, found.step)
     _require_relation(engine, axis, seed)
-    return judge(engine, engine.run(seed), found, fixed, loose, source[1])
+    return judge(engine, engine.run(seed), found, shown, loose, source[1])
 
 
-def _limits(found, record, column):
-    """Clipping that the record shows, and the samples that are free of it."""
-    used = record.valid.copy()
-    if found.lower is None and found.upper is None:
-        return {}, used
-    measured = record.sensor[:, column]
-    beyond = 1e3 * float(np.max(np.abs(measured)))
-    limits = known_effects()["clipping"](-beyond if found.lower is None else found.lower,
-                                         beyond if found.upper is None else found.upper)
-    return {"clipping": limits}, used & (measured > limits.lower) & (measured < limits.upper)
+def _shown(found, measured):
+    """Causes that the record shows by itself."""
+    effects = {cause: effect.of_record(found, measured)
+               for cause, effect in known_effects().items() if effect.read_off}
+    return {cause: effect for cause, effect in effects.items() if effect is not None}
 
 
 def _classical(record, axis, used):
-    """Classical core identified from the record, the causes that stay free because of it, and
-    those that it was identified with."""
+    """Classical core identified from the record, what it knows of it (nothing, since any cause has
+    bent it), and the effects that it was identified with."""
     from ..identification import identify
     pair = Pair(record.sampling_rate_hz, record.reference, record.sensor, used, record.lag_s,
                 record.start_ns, float("nan"))
     model = identify(pair, axis, "oscillator").model
-    return (SensorModel(model.core), _loose(model.core, dict.fromkeys(_CORE, np.inf)),
+    return (SensorModel(model.core), dict.fromkeys(_CORE, np.inf),
             {effect.cause: effect for effect in model.effects})
 
 
-def _left_open(model, axis):
-    """Causes within the stated uncertainties of a model's core, delay and offset."""
+def _stated(model, axis):
+    """Standard uncertainties that a model states of its core, delay and offset."""
     own = model.axis(axis)
     stated = model.metadata.get("uncertainties")
     if not isinstance(stated, dict) or not isinstance(own.core, Oscillator) \
-            or own.core.damping_order != 1:
+            or own.core.damping_order != 1 or any(effect.restates_core for effect in own.effects):
         return {}
-    stds = {name: entry["std"] for name, entry in stated.items()
+    return {name: entry["std"] for name, entry in stated.items()
             if isinstance(entry, dict) and isinstance(entry.get("std"), (int, float))
             and np.isfinite(entry["std"]) and entry["std"] > 0}
-    effects = {effect.cause: effect for effect in own.effects}
-    if {"core_parameter_shift", "fractional_damping", "sensitivity_error"} & set(effects):
-        return {}
-    loose = _loose(own.core, stds)
-    for name, cause in (("delay_s", "time_delay"), ("offset", "offset")):
-        if name in stds:
-            loose[cause] = Loose(effects.get(cause, known_effects()[cause](0.0)),
-                                 {name: stds[name]})
-    return loose
 
 
-def _loose(core, stds):
-    """Core parameters that are free within their standard uncertainties."""
-    known, loose = known_effects(), {}
-    if {"natural_frequency_hz", "damping_ratio"} <= set(stds):
-        loose["core_parameter_shift"] = Loose(
-            known["core_parameter_shift"](core.natural_frequency_hz, core.damping_ratio),
-            {name: stds[name] for name in ("natural_frequency_hz", "damping_ratio")})
-    if "sensitivity" in stds:
-        loose["sensitivity_error"] = Loose(known["sensitivity_error"](1.0),
-                                           {"gain": stds["sensitivity"] / abs(core.sensitivity)})
-    return loose
+def _left_open(own, stds, stamps_std_s):
+    """Causes that stay free in every fit, since model and stamps leave them open."""
+    effects = {cause: effect.left_open(own, stds, stamps_std_s)
+               for cause, effect in known_effects().items()}
+    return {cause: entry for cause, entry in effects.items() if entry is not None}
 
 
 def _require_relation(engine, axis, seed):

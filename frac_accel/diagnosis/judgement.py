@@ -1,6 +1,7 @@
 """From fitted causes to a verdict: what is named, what is not, and why."""
 
 import dataclasses
+import math
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -38,7 +39,8 @@ class Finding:
     std : dict of str to float
         Standard uncertainties of the parameters.
     confidence : float
-        Weight of the sets of causes with this one among all that were fitted.
+        Weight of the sets of causes with this one among all that were fitted; where no fit
+        competed, since the record shows it by itself, the chance that the gain is above zero.
     confusable_with : list of str
         Rivals that explain nearly as much.
     evidence : list of str
@@ -122,22 +124,45 @@ def insufficient(reason, model, found):
 
 
 @dataclasses.dataclass(frozen=True)
-class Loose:
-    """A cause that stays free in every fit, because the model in use leaves it open.
+class Seen:
+    """A record beside the best simulation of it, for causes that it shows by itself.
 
     Attributes
     ----------
-    effect : Effect
-        What the model in use says.
-    std : dict of str to float
-        How well it knows that, by parameter; infinite where not at all.
+    record : Record
+    found : Integrity
+    sensor : Samples
+        The sensor's samples as they were recorded.
+    measured, output : ndarray, shape (n,)
+    rows, used : ndarray of bool, shape (n,)
+        Samples that are there, and those of them that the fit counted.
+    is_coarse : bool
+        Whether the values' lattice accounts for much of what is left.
     """
 
-    effect: object
-    std: dict
+    record: object
+    found: object
+    sensor: object
+    measured: np.ndarray
+    output: np.ndarray
+    rows: np.ndarray
+    used: np.ndarray
+    is_coarse: bool
+
+    def at_stamps(self):
+        """Instants with a sample, and the simulated output at the stamps that these carry."""
+        stamps, _ = clean(self.sensor)
+        rate = self.record.sampling_rate_hz
+        place = (stamps - self.record.start_ns) * 1e-9 * rate
+        slot = np.round(place).astype(int)
+        good = (slot >= 0) & (slot < len(self.output))
+        fine = resample_poly(self.output, 4, 1)
+        spline = CubicSpline(np.arange(len(fine)) / 4, fine)
+        return slot[good], spline(np.clip(place[good] - self.record.lag_s * rate, 0,
+                                          len(self.output) - 1))
 
 
-def judge(engine, best, found, fixed, loose, sensor):
+def judge(engine, best, found, shown, loose, sensor):
     """Verdict on the best set of causes.
 
     Parameters
@@ -145,9 +170,9 @@ def judge(engine, best, found, fixed, loose, sensor):
     engine : Engine
     best : Fitted
     found : Integrity
-    fixed : dict of str to Effect
-        Causes read off the record.
-    loose : dict of str to Loose
+    shown : dict of str to Effect
+        Causes that the record shows by itself.
+    loose : dict of str to Open
         Causes that were free in every fit.
     sensor : Samples
         The sensor's samples as they were recorded.
@@ -182,7 +207,7 @@ def judge(engine, best, found, fixed, loose, sensor):
         else:
             suspects.append(_suspect({cause, *instead}, margin))
     findings += _moved(engine, best, loose, stds)
-    findings += _read_off(engine, best, found, fixed, sensor)
+    findings += _read_off(engine, best, found, shown, sensor)
     return _verdict(engine, best, left, findings, suspects, found)
 
 
@@ -244,9 +269,8 @@ def _extended(engine, effects):
     """The model in use with these causes on the diagnosed axis."""
     p = engine.problem
     own = p.axis_model(effects)
-    # the stamps, and with them the clock, are the same for all axes
-    clock = {cause: effect for cause, effect in effects.items() if effect.clock_ratio() != 1}
-    axes = {name: p.axis_model(clock, i) for i, name in enumerate(AXES)}
+    common = {cause: effect for cause, effect in effects.items() if effect.common_to_axes}
+    axes = {name: p.axis_model(common, i) for i, name in enumerate(AXES)}
     axes[AXES[p.axis]] = AxisModel(own.core, own.effects)
     return SensorModel(p.baseline.core, p.baseline.effects, axes, p.baseline.metadata)
 
@@ -257,6 +281,12 @@ def _rms(error, rows):
 
 def _confidence(margin):
     return float(1 / (1 + np.exp(-min(margin, 1400.0) / 2)))
+
+
+def _certainty(g):
+    """Chance that a gain is above zero, as its bootstrap interval has it."""
+    std = max((g.ci95[1] - g.ci95[0]) / 3.92, 1e-12)
+    return 0.5 + 0.5 * math.erf(g.reduction / std / math.sqrt(2))
 
 
 def _evidence(cause, g, margin, instead):
@@ -283,67 +313,26 @@ def _moved(engine, best, loose, stds):
         held = engine.problem.simulate({**best.effects, cause: entry.effect})
         g = gain(error + (best.simulated - held)[rows], error)
         if g.ci95[0] > 0 and g.reduction > _RELEVANT:
-            findings.append(Finding(effect, stds[cause], 0.999, [], [
+            findings.append(Finding(effect, stds[cause], _confidence(farthest**2), [], [
                 f"{farthest:.3g} standard uncertainties from what the model allows for",
                 *_evidence(cause, g, np.inf, [])], g))
     return findings
 
 
-def _read_off(engine, best, found, fixed, sensor):
+def _read_off(engine, best, found, shown, sensor):
     """Findings that the record shows by itself: limits, lattice, stamps."""
-    p, known = engine.problem, known_effects()
-    # clipped samples count here, and nothing was fitted: all samples do
+    p, findings = engine.problem, []
     rows = p.record.valid.copy()
     rows[:64] = rows[-64:] = False
-    output, findings = best.output, []
-
-    def add(effect, std, before, after, evidence):
-        g = gain(before, after)
+    seen = Seen(p.record, found, sensor, p.measured, best.output, rows, rows & p.used,
+                engine.coarse_step(best) is not None)
+    for cause, cls in known_effects().items():
+        recognised = cls.recognised(seen, shown.get(cause)) if cls.read_off else None
+        if recognised is None:
+            continue
+        effect, reading = recognised
+        g = gain(reading.before, reading.after)
         if g.ci95[0] > 0 and g.reduction > _RELEVANT:
-            findings.append(Finding(effect, std, 0.999, [], [evidence, *_evidence(
-                effect.cause, g, np.inf, [])], g))
-
-    if "clipping" in fixed:
-        limits = fixed["clipping"]
-        resolution = (found.step or 0.0) / np.sqrt(12)
-        add(limits, {"lower": resolution, "upper": resolution},
-            (p.measured - output)[rows],
-            (p.measured - np.clip(output, limits.lower, limits.upper))[rows],
-            "; ".join(words for words in found.words if "limit" in words))
-    if engine.coarse_step(best):
-        coarse = found.step * np.round(output / found.step)
-        free = rows & p.used
-        add(known["quantization"](found.step), {"step": 1e-6 * found.step},
-            (p.measured - output)[free], (p.measured - coarse)[free],
-            next(words for words in found.words if "multiples" in words))
-    if found.jitter_rms_s:
-        slot, values = _at_stamps(output, p.record, sensor)
-        inside = rows[slot] & p.used[slot]
-        slot, values = slot[inside], values[inside]
-        add(known["timestamp_jitter"](found.jitter_rms_s),
-            {"rms_s": found.jitter_rms_s / np.sqrt(2 * found.samples)},
-            p.measured[slot] - values, p.measured[slot] - output[slot],
-            next(words for words in found.words if "scatter" in words))
-    if found.missing:
-        counted = np.flatnonzero(p.record.valid)
-        here = np.arange(len(counted))
-        late = rows[counted] & p.used[counted]
-        fraction = found.dropped_fraction
-        add(known["dropped_samples"](fraction),
-            {"fraction": np.sqrt(fraction * (1 - fraction) / (found.samples + found.missing))},
-            (p.measured[counted] - output[here])[late],
-            (p.measured - output)[counted][late],
-            next(words for words in found.words if "missing" in words))
+            findings.append(Finding(effect, reading.std, _certainty(g), [], [
+                reading.evidence, *_evidence(cause, g, np.inf, [])], g))
     return findings
-
-
-def _at_stamps(simulated, record, sensor):
-    """Instants with a sample, and the simulated output at the stamps that these carry."""
-    stamps, _ = clean(sensor)
-    place = (stamps - record.start_ns) * 1e-9 * record.sampling_rate_hz
-    slot = np.round(place).astype(int)
-    good = (slot >= 0) & (slot < len(simulated))
-    fine = resample_poly(simulated, 4, 1)
-    spline = CubicSpline(np.arange(len(fine)) / 4, fine)
-    return slot[good], spline(np.clip(place[good] - record.lag_s * record.sampling_rate_hz, 0,
-                                      len(simulated) - 1))

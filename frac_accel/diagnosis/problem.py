@@ -9,10 +9,9 @@ from scipy.optimize import lsq_linear
 
 from ..core.oscillator import tail_rates
 from ..effects.base import CORE, CROSS_AXIS, GAIN, Effect
-from ..effects.time_delay import TimeDelay
 from ..errors import FracAccelError
-from ..model import AXES, AxisModel
-from ..parameters import parameter_fields
+from ..model import AXES, AxisModel, is_link
+from ..parameters import Scales, parameter_fields
 from ..simulation import AxisSimulator, kept
 
 # Samples at both ends that the band-limited simulation cannot know.
@@ -157,7 +156,7 @@ class Problem:
         if (axis, steps) not in self._simulators:
             self._simulators[axis, steps] = AxisSimulator(
                 self.record.reference[:, axis], self.rate, self.record.temperature_c,
-                steps_per_sample=steps)
+                steps_per_sample=steps, lag_s=self.record.lag_s)
         return self._simulators[axis, steps]
 
     def axis_model(self, effects, axis=None):
@@ -167,35 +166,33 @@ class Problem:
         return AxisModel(base.core, tuple(sorted([*kept, *effects.values()],
                                                  key=lambda effect: effect.stage)))
 
-    def _on_stamps(self, model):
-        """The model of an axis with the sensor's stamps instead of the reference's."""
-        lag = self.record.lag_s
-        if not lag:
-            return model
-        others = tuple(e for e in model.effects if e.cause != "time_delay")
-        return AxisModel(model.core, (*others, TimeDelay(model.delay_s - lag)))
-
     def simulate(self, effects, across=True, steps=_STEPS):
         """Output of the axis with these causes, shape (n,); without what comes across if asked."""
         self.calls += 1
-        model = self._on_stamps(self.axis_model(effects))
+        model = self.axis_model(effects)
         simulator = self.simulator(self.axis, steps)
         values = simulator.respond(model)
         for effect in model.effects:
             if effect.stage != CROSS_AXIS:
-                values = effect.simulate(values, simulator.circumstances)
-            elif across:
-                values = values + self._across(effects, effect)
+                values = effect.live(self.rate).simulate(values, simulator.circumstances)
+            else:
+                shares = effect.share_of_axes(self.axis)
+                values = shares[self.axis] * values
+                if across:
+                    values = values + self._across(effects, shares)
         return values
 
-    def _across(self, effects, cross):
-        """What the other axes add; so little that few steps do."""
+    def _across(self, effects, shares):
+        """What the other axes add; so little that few steps do.
+
+        These have the model in use, and of the causes only what is the same for all axes.
+        """
         total = np.zeros(len(self.record))
-        for other, name in enumerate(AXES):
-            share = getattr(cross, name)
+        common = {cause: effect for cause, effect in effects.items() if effect.common_to_axes}
+        for other, share in enumerate(shares):
             if other == self.axis or not share or not np.ptp(self.record.reference[:, other]):
                 continue
-            model = self._on_stamps(self.axis_model(effects, other))
+            model = self.axis_model(common, other)
             before = tuple(e for e in model.effects if e.stage < CROSS_AXIS)
             total += share * kept(
                 self._others, (other, before),
@@ -211,7 +208,7 @@ class Problem:
         """
         linear = {name: other for name, other in effects.items()
                   if not acts_on_spring(other) and name != cause}
-        model = self._on_stamps(self.axis_model(linear))
+        model = self.axis_model(linear)
         if acts_on_spring(effect):
             motion = self._motion({name: other for name, other in effects.items() if name != cause})
             added = self.force(model, effect, motion)
@@ -219,8 +216,9 @@ class Problem:
                 added = added - self.force(model, effects[cause], motion)
             for later in model.effects:
                 # gains after the core act on what it adds as well; the rest is nearly the same
-                if later.stage == GAIN and later.cause != "sensitivity_error":
-                    added = later.simulate(added, self.simulator(self.axis).circumstances)
+                if later.stage == GAIN and not is_link(later):
+                    added = later.live(self.rate).simulate(
+                        added, self.simulator(self.axis).circumstances)
             return added
         before = {**linear, cause: effects[cause]} if cause in effects else linear
         across = effect.stage == CROSS_AXIS
@@ -229,7 +227,7 @@ class Problem:
     def force(self, model, effect, motion):
         """First-order response to a force along a motion."""
         from .first_order import force_response
-        return force_response(model, effect, motion, self.rate)
+        return force_response(model, effect, motion, self.rate, self.record.lag_s)
 
     def _motion(self, effects):
         """Motion of the mass with these causes, shape (n,) [output units]; the last one is kept."""
@@ -443,47 +441,37 @@ class Problem:
 
     def unknowns(self, effect):
         """Unknowns of one effect."""
-        result = []
-        for field in [] if effect.read_off else parameter_fields(type(effect)):
-            if effect.cause == "cross_axis_sensitivity":
-                other = AXES.index(field.name)
-                if other == self.axis or not np.ptp(self.record.reference[:, other]):
-                    continue
-            value, limits = getattr(effect, field.name), field.metadata
-            logarithmic = limits["above"] == 0 and limits["below"] is None
-            scale = self.scale(effect.cause, field.name, value)
-            lows = [limits[key] for key in ("above", "minimum") if limits[key] is not None]
-            highs = [limits[key] for key in ("below", "maximum") if limits[key] is not None]
-            low, high = max(lows, default=-np.inf), min(highs, default=np.inf)
-            if logarithmic:
-                least, most = self.reach(field.name, scale)
-                most = effect.sought.get(field.name, most)
-                low, high = np.log(least), np.log(min(high, most))
-            else:
-                span = 1e-3 if np.isfinite(low) and np.isfinite(high) else 0
-                low, high = low / scale + span, high / scale - span
-            result.append(Unknown(effect.cause, field.name, logarithmic, scale, low, high,
-                                  effect.steps.get(field.name, _STEP)))
-        return result
+        if effect.read_off:
+            return []
+        names = effect.fitted_parameters(AXES[self.axis], self.excited)
+        return [self._unknown(effect, field) for field in parameter_fields(type(effect))
+                if field.name in names]
 
-    def reach(self, name, scale):
-        """Smallest and largest value of a positive parameter that a record could show."""
-        if name.endswith("_hz"):
-            return 1e-6 * self.rate, 1e3 * self.rate
-        if name == "damping_ratio":
-            return 1e-4, 100.0
-        return 1e-9 * scale, 1e9 * scale
+    def _unknown(self, effect, field):
+        limits = field.metadata
+        scale = self.scales.of(field, getattr(effect, field.name))
+        lows = [limits[key] for key in ("above", "minimum") if limits[key] is not None]
+        highs = [limits[key] for key in ("below", "maximum") if limits[key] is not None]
+        low, high = max(lows, default=-np.inf), min(highs, default=np.inf)
+        logarithmic = limits["above"] == 0 and limits["below"] is None
+        if logarithmic:
+            least, most = self.scales.reach(field, scale)
+            low, high = np.log(least), np.log(min(high, most))
+        else:
+            span = 1e-3 if np.isfinite(low) and np.isfinite(high) else 0
+            low, high = low / scale + span, high / scale - span
+        return Unknown(effect.cause, field.name, logarithmic, scale, low, high,
+                       limits["step"] or _STEP)
 
-    def scale(self, cause, name, value):
-        """Change of a parameter that counts as one."""
-        level = float(np.std(self.measured[self.used]))
-        typical = {"delay_s": 1 / self.rate, "skew_ppm": 100.0, "offset": level,
-                   "rate_per_s": 1 / self.time[-1], "coefficient_per_k": 0.01,
-                   "alpha2": 0.1 / level, "alpha3": 0.1 / level**2, "gamma": 1 / level,
-                   "level": 0.1 * level, "half_width": 0.1 * level, "strength": 0.1,
-                   "beta": 1 / level, "phase_rad": 1.0, "amplitude": level, "gain": 1.0,
-                   "damping_order": 1.0, "x": 1.0, "y": 1.0, "z": 1.0}
-        return typical.get(name, max(abs(value), 1e-12))
+    @functools.cached_property
+    def scales(self):
+        """What is small or large in this record."""
+        return Scales(float(np.std(self.measured[self.used])), self.rate, float(self.time[-1]))
+
+    @functools.cached_property
+    def excited(self):
+        """By axis, whether the reference moves along it."""
+        return {name: bool(np.ptp(self.record.reference[:, i])) for i, name in enumerate(AXES)}
 
 
 def _span(columns):

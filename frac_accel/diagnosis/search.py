@@ -101,7 +101,7 @@ class Search:
                     model.effective_core, model.delay_s,
                     float(np.std(fitted.simulated[p.used])),
                     celsius is not None and np.ptp(celsius) > 0.1,
-                    {name: bool(np.ptp(p.record.reference[:, i])) for i, name in enumerate("xyz")},
+                    p.excited,
                     "xyz"[p.axis])
 
     def screen(self, fitted):

@@ -19,7 +19,7 @@ class AcCoupling(Effect):
     experiment = ("Hold a constant acceleration, such as gravity after turning the sensor over: "
                   "behind a high-pass the output returns to zero.")
 
-    corner_hz: float = parameter("Hz", above=0)
+    corner_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-6, 1e3), null=0.0)
 
     def transfer_function(self, s):
         return s / (s + 2 * np.pi * self.corner_hz)

@@ -7,8 +7,10 @@ An effect acts in one of these ways, and overrides what it needs:
 * as a linear time-invariant link (`transfer_function`, `pure_delay_s`), e.g. a low-pass: all
   links of an axis and its core form one composite response, simulated and inverted as one filter;
 * on the sensor's clock (`clock_ratio`);
-* on the samples after all that (`simulate`, `invert`), e.g. an offset; where the inverse depends
-  on the samples before, `live` gives an object that remembers them.
+* on the samples after all that (`simulate`, `invert`), e.g. an offset; where either depends on the
+  samples before, `live` gives an object that remembers them.
+
+Nothing outside the file of a cause names it: what is particular to it, it declares itself.
 """
 
 from typing import ClassVar, NamedTuple
@@ -17,6 +19,7 @@ import numpy as np
 
 from ..core import Oscillator
 from ..errors import ModelError
+from ..parameters import parameter_fields
 
 # Place in the signal's way through the sensor, from base to record.
 (MOUNTING, CORE, CONDITIONER, DELAY, GAIN, CROSS_AXIS, OFFSET, DEAD_ZONE, INTERFERENCE, CLIPPING,
@@ -44,24 +47,61 @@ class Circumstances(NamedTuple):
         return cls(np.zeros(n), np.full(n, 25.0))
 
 
+class Reading(NamedTuple):
+    """A cause that a record shows by itself, beside what a simulation explains of it.
+
+    Attributes
+    ----------
+    std : dict of str to float
+        Standard uncertainties of the parameters.
+    before, after : ndarray, shape (m,)
+        Errors of the simulation without and with the cause, in the samples' order.
+    evidence : str
+    """
+
+    std: dict
+    before: np.ndarray
+    after: np.ndarray
+    evidence: str
+
+
+class Open(NamedTuple):
+    """A cause that the model in use leaves open, since it knows a parameter only so well.
+
+    Attributes
+    ----------
+    effect : Effect
+        What the model in use says.
+    std : dict of str to float
+        Standard uncertainty by parameter; infinite where nothing is known.
+    """
+
+    effect: object
+    std: dict
+
+
 class Effect:
-    """Base of all effects; a subclass is a frozen dataclass of its parameters."""
+    """Base of all effects; a subclass is a frozen dataclass of its parameters.
+
+    All that anything else needs of a cause is declared here, in its own file: `check_effect` tells
+    whether it holds together.
+    """
 
     cause: ClassVar[str]
     stage: ClassVar[int]
     explanation: ClassVar[str]
-    needs_temperature: ClassVar[bool] = False
     # what separates this cause from its rivals where a record cannot
     experiment: ClassVar[str] = "Repeat with a wider band, and at half and at twice the level."
+    needs_temperature: ClassVar[bool] = False
 
-    # True for what is read off a record's stamps and values, and never fitted
+    # True for what a record shows by itself (`of_record`, `reading`), and no fit looks for
     read_off: ClassVar[bool] = False
-
-    # Largest values of parameters that a diagnosis looks for, where others would not be this cause.
-    sought: ClassVar[dict[str, float]] = {}
-
-    # Relative changes of parameters for numerical derivatives, where the usual one is too large.
-    steps: ClassVar[dict[str, float]] = {}
+    # True where one clock or one way to the stamps makes it the same for all axes
+    common_to_axes: ClassVar[bool] = False
+    # True for what says anew what the core already says
+    restates_core: ClassVar[bool] = False
+    # name among the parameters that `identify` finds beside a core
+    identified_as: ClassVar[str | None] = None
 
     @classmethod
     def starts(cls, view):
@@ -78,6 +118,73 @@ class Effect:
             Of `fit_starts`; none where the record cannot show this cause.
         """
         return []
+
+    @classmethod
+    def fitted_parameters(cls, axis, excited):
+        """Names of the parameters that a record of this axis can determine.
+
+        Parameters
+        ----------
+        axis : {"x", "y", "z"}
+        excited : dict of str to bool
+            By axis, whether the reference moves along it.
+        """
+        return [field.name for field in parameter_fields(cls)]
+
+    @classmethod
+    def left_open(cls, axis_model, stds, stamps_std_s):
+        """`Open` where the model in use knows this cause only so well, otherwise None.
+
+        Parameters
+        ----------
+        axis_model : AxisModel
+        stds : dict of str to float
+            Standard uncertainties of the model's own parameters, as ``identify`` names them.
+        stamps_std_s : float
+            Uncertainty [s] of the record's common instants, by stamps that scatter.
+        """
+        return None
+
+    @classmethod
+    def of_record(cls, found, measured):
+        """Effect of this cause as a record shows it by itself, or None.
+
+        Parameters
+        ----------
+        found : Integrity
+        measured : ndarray, shape (n,)
+        """
+        return None
+
+    def spoiled(self, measured):
+        """Mask, shape (n,): samples that because of this effect say nothing of any other."""
+        return np.zeros(len(measured), bool)
+
+    def reading(self, seen):
+        """What this effect of `of_record` explains beside a simulation: `Reading`, or None.
+
+        Parameters
+        ----------
+        seen : diagnosis.judgement.Seen
+        """
+        return None
+
+    @classmethod
+    def recognised(cls, seen, shown):
+        """This cause as what is left of a record shows it.
+
+        Parameters
+        ----------
+        seen : diagnosis.judgement.Seen
+        shown : Effect or None
+            What `of_record` found.
+
+        Returns
+        -------
+        tuple of Effect and Reading, or None
+        """
+        reading = shown.reading(seen) if shown is not None else None
+        return (shown, reading) if reading is not None else None
 
     def pure_delay_s(self):
         """Time [s] by which this effect moves the signal as it is."""
@@ -146,8 +253,24 @@ class Effect:
         return values, variance
 
     def live(self, sampling_rate_hz):
-        """Object whose `invert` takes consecutive blocks of a stream at that rate."""
+        """This effect on one stream of samples, for simulation and for inversion.
+
+        An effect with memory returns a new object whose `simulate` and `invert` take consecutive
+        blocks and remember; results must not depend on where the blocks are cut. Everything runs
+        through it, a whole record as one block.
+
+        Parameters
+        ----------
+        sampling_rate_hz : float
+        """
         return self
+
+    def share_of_axes(self, axis):
+        """Share of each axis's output, shape (3,), in that of an axis (0, 1, 2), itself included.
+
+        Of effects at the stage `CROSS_AXIS`.
+        """
+        return np.eye(3)[axis]
 
     @classmethod
     def simulate_axes(cls, values, by_axis, circumstances):

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..parameters import parameter
-from .base import CLIPPING, Effect
+from .base import CLIPPING, Effect, Reading
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,6 +26,25 @@ class Clipping(Effect):
         if not self.lower < self.upper:
             raise ModelError(f"effects: clipping from {self.lower:g} to {self.upper:g} given, "
                              "expected lower below upper")
+
+    @classmethod
+    def of_record(cls, found, measured):
+        if found.lower is None and found.upper is None:
+            return None
+        beyond = 1e3 * float(np.max(np.abs(measured)))
+        return cls(-beyond if found.lower is None else found.lower,
+                   beyond if found.upper is None else found.upper)
+
+    def spoiled(self, measured):
+        return (measured <= self.lower) | (measured >= self.upper)
+
+    def reading(self, seen):
+        """All samples count: nothing was fitted to those at a limit."""
+        resolution = (seen.found.step or 0.0) / np.sqrt(12)
+        return Reading({"lower": resolution, "upper": resolution},
+                       (seen.measured - seen.output)[seen.rows],
+                       (seen.measured - self.simulate(seen.output, None))[seen.rows],
+                       "; ".join(words for words in seen.found.words if "limit" in words))
 
     def simulate(self, values, circumstances):
         return np.clip(values, self.lower, self.upper)

@@ -17,8 +17,11 @@ class ClockSkew(Effect):
     experiment = ("Record longer, with a sharp event at the beginning and at the end: a skew lets "
                   "the lag grow from one to the other.")
 
+    common_to_axes = True
+
     # no crystal is off by more than this
-    skew_ppm: float = parameter("1e-6", minimum=-10_000, maximum=10_000)
+    skew_ppm: float = parameter("1e-6", minimum=-10_000, maximum=10_000, scale=100.0,
+                                null=0.0)
 
     def clock_ratio(self):
         return 1 + 1e-6 * self.skew_ppm

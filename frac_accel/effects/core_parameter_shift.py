@@ -2,8 +2,8 @@
 
 import dataclasses
 
-from ..parameters import parameter
-from .base import CORE, Effect, require_oscillator
+from ..parameters import parameter, parameter_fields
+from .base import CORE, Effect, Open, require_oscillator
 from .fit_starts import Start
 
 
@@ -17,8 +17,20 @@ class CoreParameterShift(Effect):
     experiment = ("Sweep across the resonance: place and width of the peak give frequency and "
                   "damping by themselves.")
 
-    natural_frequency_hz: float = parameter("Hz", above=0, maximum=1e8)
-    damping_ratio: float = parameter("1", above=0, maximum=100)
+    natural_frequency_hz: float = parameter("Hz", above=0, maximum=1e8, scale="rate",
+                                            reach=(1e-6, 1e3), null="core")
+    damping_ratio: float = parameter("1", above=0, maximum=100, scale=1.0, reach=(1e-4, 100.0),
+                                     null="core")
+
+    restates_core = True
+
+    @classmethod
+    def left_open(cls, axis_model, stds, stamps_std_s):
+        own = {field.name: getattr(axis_model.core, field.name, None)
+               for field in parameter_fields(cls)}
+        if None in own.values() or not own.keys() <= stds.keys():
+            return None
+        return Open(cls(**own), {name: stds[name] for name in own})
 
     def change_core(self, core):
         """Raise ModelError where the core is not an oscillator."""

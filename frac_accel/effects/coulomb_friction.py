@@ -17,7 +17,7 @@ class CoulombFriction(Effect):
     experiment = ("Repeat at a tenth of the level: friction does not shrink with the motion, and "
                   "in the end holds the mass altogether.")
 
-    level: float = parameter("output units", minimum=0)
+    level: float = parameter("output units", minimum=0, scale=(0.1, "level"), null=0.0)
 
     def change_core(self, core):
         return require_oscillator(core, self.cause)

@@ -21,17 +21,25 @@ class CrossAxisSensitivity(Effect):
     experiment = ("Move in one direction across the axis at a time, with the axis itself at rest: "
                   "what it still shows came across.")
 
-    x: float = parameter("1", minimum=-1, maximum=1, default=0.0)
-    y: float = parameter("1", minimum=-1, maximum=1, default=0.0)
-    z: float = parameter("1", minimum=-1, maximum=1, default=0.0)
+    x: float = parameter("1", minimum=-1, maximum=1, default=0.0, scale=1.0, null=0.0)
+    y: float = parameter("1", minimum=-1, maximum=1, default=0.0, scale=1.0, null=0.0)
+    z: float = parameter("1", minimum=-1, maximum=1, default=0.0, scale=1.0, null=0.0)
+
+    def share_of_axes(self, axis):
+        shares = np.array([self.x, self.y, self.z])
+        shares[axis] = 1.0
+        return shares
+
+    @classmethod
+    def fitted_parameters(cls, axis, excited):
+        return [other for other in "xyz" if other != axis and excited[other]]
 
     @classmethod
     def matrix(cls, by_axis):
         """3 by 3 matrix that turns outputs without cross-axis sensitivity into those with it."""
         matrix = np.eye(3)
         for axis, effect in by_axis.items():
-            matrix[axis] = effect.x, effect.y, effect.z
-            matrix[axis, axis] = 1.0
+            matrix[axis] = effect.share_of_axes(axis)
         return matrix
 
     @classmethod

@@ -17,7 +17,7 @@ class CubicStiffness(Effect):
     experiment = ("Repeat at half and at twice the level: the deviation grows with the cube of "
                   "the level.")
 
-    alpha3: float = parameter("1/(output units)^2")
+    alpha3: float = parameter("1/(output units)^2", scale=(0.1, "per_level_squared"), null=0.0)
 
     def change_core(self, core):
         return require_oscillator(core, self.cause)

@@ -19,7 +19,8 @@ class DeadZone(Effect):
     experiment = ("Repeat at a tenth of the level: a dead zone takes the same amount from every "
                   "swing, and all of a small one.")
 
-    half_width: float = parameter("output units", minimum=0)
+    half_width: float = parameter("output units", minimum=0, scale=(0.1, "level"),
+                                  null=0.0)
 
     def simulate(self, values, circumstances):
         return values - np.clip(values, -self.half_width, self.half_width)

@@ -2,8 +2,10 @@
 
 import dataclasses
 
+import numpy as np
+
 from ..parameters import parameter
-from .base import STAMPS, Effect
+from .base import STAMPS, Effect, Reading
 
 
 @dataclasses.dataclass(frozen=True)
@@ -16,4 +18,19 @@ class DroppedSamples(Effect):
     explanation = "Some of the sensor's messages are lost."
     experiment = "Number the messages at their source: missing numbers are messages that were lost."
 
-    fraction: float = parameter("1", minimum=0, below=1)
+    @classmethod
+    def of_record(cls, found, measured):
+        return cls(found.dropped_fraction) if found.missing else None
+
+    def reading(self, seen):
+        """Beside a simulation whose samples are counted as if none were lost."""
+        counted = np.flatnonzero(seen.record.valid)
+        late = seen.used[counted]
+        share, whole = self.fraction, seen.found.samples + seen.found.missing
+        error = seen.measured - seen.output
+        return Reading({"fraction": float(np.sqrt(share * (1 - share) / whole))},
+                       (seen.measured[counted] - seen.output[:len(counted)])[late],
+                       error[counted][late],
+                       next(words for words in seen.found.words if "missing" in words))
+
+    fraction: float = parameter("1", minimum=0, below=1, null=0.0)

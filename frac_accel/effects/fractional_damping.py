@@ -17,8 +17,11 @@ class FractionalDamping(Effect):
     experiment = ("Sweep from far below to far above the resonance: damping of another order "
                   "turns the phase over decades, not at the resonance alone.")
 
-    damping_order: float = parameter("1", above=0, below=2)
-    damping_ratio: float = parameter("1", above=0, maximum=100)
+    damping_order: float = parameter("1", above=0, below=2, scale=1.0, null="core")
+    damping_ratio: float = parameter("1", above=0, maximum=100, scale=1.0, reach=(1e-4, 100.0),
+                                     null="core")
+
+    restates_core = True
 
     def change_core(self, core):
         """Raise ModelError where the core is not an oscillator."""

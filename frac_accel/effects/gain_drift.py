@@ -20,7 +20,7 @@ class GainDrift(Effect):
     explanation = "The sensitivity drifts with time."
     experiment = "Keep level and temperature constant for longer: a drift goes on with time."
 
-    rate_per_s: float = parameter("1/s")
+    rate_per_s: float = parameter("1/s", scale="per_duration", null=0.0)
 
     def simulate(self, values, circumstances):
         return values * self._gain(circumstances)

@@ -23,9 +23,9 @@ class Hysteresis(Effect):
     experiment = ("Drive one slow sine at several levels: output over acceleration is a loop, "
                   "which stays open however slow.")
 
-    strength: float = parameter("1")
-    beta: float = parameter("1/(output units)", minimum=0)
-    gamma: float = parameter("1/(output units)")
+    strength: float = parameter("1", scale=0.1, null=0.0)
+    beta: float = parameter("1/(output units)", scale="per_level", minimum=0)
+    gamma: float = parameter("1/(output units)", scale="per_level")
 
     def __post_init__(self):
         # F. Ikhouane, J. Rodellar, Systems with Hysteresis (2007), table 2.1: else z has no bound

@@ -19,7 +19,7 @@ class LowPassLag(Effect):
     experiment = ("Excite up to several times the corner frequency: a low-pass takes amplitude "
                   "away there, a delay does not.")
 
-    corner_hz: float = parameter("Hz", above=0)
+    corner_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-6, 1e3), null=np.inf)
 
     def transfer_function(self, s):
         corner = 2 * np.pi * self.corner_hz

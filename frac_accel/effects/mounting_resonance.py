@@ -23,10 +23,10 @@ class MountingResonance(Effect):
     explanation = "The mounting is a spring: it has a resonance of its own below the sensor."
     experiment = ("Remount the sensor, or change the mounting's stiffness: a resonance of the "
                   "mounting moves with it.")
-    sought = {"damping_ratio": 1.0}  # more is no resonance: it looks like a low-pass
 
-    frequency_hz: float = parameter("Hz", above=0)
-    damping_ratio: float = parameter("1", above=0, maximum=100)
+    frequency_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-6, 1e3), null=np.inf)
+    # more than 1 is no resonance: it looks like a low-pass
+    damping_ratio: float = parameter("1", above=0, maximum=100, scale=1.0, reach=(1e-4, 1.0))
 
     def transfer_function(self, s):
         u = s / (2 * np.pi * self.frequency_hz)

@@ -17,7 +17,7 @@ class QuadraticStiffness(Effect):
     experiment = ("Repeat at half and at twice the level: the deviation grows with the square of "
                   "the level, with a second harmonic and a shift of the mean.")
 
-    alpha2: float = parameter("1/(output units)")
+    alpha2: float = parameter("1/(output units)", scale=(0.1, "per_level"), null=0.0)
 
     def change_core(self, core):
         return require_oscillator(core, self.cause)

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from ..parameters import parameter
-from .base import QUANTIZATION, Effect
+from .base import QUANTIZATION, Effect, Reading
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,6 +19,17 @@ class Quantization(Effect):
     experiment = "Repeat at a tenth of the level: the steps between the values stay as large."
 
     step: float = parameter("output units", above=0)
+
+    @classmethod
+    def of_record(cls, found, measured):
+        return cls(found.step) if found.step else None
+
+    def reading(self, seen):
+        if not seen.is_coarse:
+            return None
+        return Reading({"step": 1e-6 * self.step}, (seen.measured - seen.output)[seen.used],
+                       (seen.measured - self.simulate(seen.output, None))[seen.used],
+                       next(words for words in seen.found.words if "multiples" in words))
 
     def simulate(self, values, circumstances):
         return self.step * np.round(values / self.step)

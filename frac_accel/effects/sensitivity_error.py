@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from ..parameters import parameter
-from .base import GAIN, Effect
+from .base import GAIN, Effect, Open
 from .fit_starts import finite, free
 
 
@@ -19,7 +19,15 @@ class SensitivityError(Effect):
     experiment = ("Compare with the reference at one frequency far below the resonance: a ratio "
                   "of amplitudes other than 1 there is the sensitivity.")
 
-    gain: float = parameter("1")
+    gain: float = parameter("1", scale=1.0, null=1.0)
+
+    restates_core = True
+
+    @classmethod
+    def left_open(cls, axis_model, stds, stamps_std_s):
+        if "sensitivity" not in stds:
+            return None
+        return Open(cls(1.0), {"gain": stds["sensitivity"] / abs(axis_model.core.sensitivity)})
 
     def transfer_function(self, s):
         return np.full_like(s, self.gain, dtype=complex)

@@ -25,7 +25,8 @@ class TemperatureSensitivity(Effect):
     experiment = ("Run a temperature cycle at constant excitation, and record the temperature: "
                   "the gain comes back with it, unlike a drift.")
 
-    coefficient_per_k: float = parameter("1/K", minimum=-0.1, maximum=0.1)
+    coefficient_per_k: float = parameter("1/K", minimum=-0.1, maximum=0.1, scale=0.01,
+                                         null=0.0)
 
     def simulate(self, values, circumstances):
         if circumstances.temperature_c is None:

@@ -2,8 +2,10 @@
 
 import dataclasses
 
+import numpy as np
+
 from ..parameters import parameter
-from .base import DELAY, Effect
+from .base import DELAY, Effect, Open
 from .fit_starts import bulk_shift, finite, free
 
 
@@ -20,7 +22,15 @@ class TimeDelay(Effect):
                   "amplitude changes.")
 
     # no accelerometer is later than this: a larger number is in milliseconds
-    delay_s: float = parameter("s", minimum=-10, maximum=10)
+    delay_s: float = parameter("s", minimum=-10, maximum=10, scale="interval", null=0.0)
+
+    common_to_axes = True
+    identified_as = "delay_s"
+
+    @classmethod
+    def left_open(cls, axis_model, stds, stamps_std_s):
+        std = float(np.hypot(stds.get("delay_s", 0.0), stamps_std_s))
+        return Open(cls(axis_model.delay_s), {"delay_s": std}) if std else None
 
     def pure_delay_s(self):
         return self.delay_s

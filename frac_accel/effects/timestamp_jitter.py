@@ -2,8 +2,10 @@
 
 import dataclasses
 
+import numpy as np
+
 from ..parameters import parameter
-from .base import STAMPS, Effect
+from .base import STAMPS, Effect, Reading
 
 
 @dataclasses.dataclass(frozen=True)
@@ -17,4 +19,17 @@ class TimestampJitter(Effect):
     experiment = ("Let the sensor's own clock or a hardware trigger stamp the samples: the "
                   "scatter goes, and the error with it.")
 
-    rms_s: float = parameter("s", minimum=0, maximum=10)
+    @classmethod
+    def of_record(cls, found, measured):
+        return cls(found.jitter_rms_s) if found.jitter_rms_s else None
+
+    def reading(self, seen):
+        """Beside a simulation whose samples are taken at the stamps that they carry."""
+        slot, values = seen.at_stamps()
+        inside = seen.used[slot]
+        slot, values = slot[inside], values[inside]
+        return Reading({"rms_s": self.rms_s / np.sqrt(2 * seen.found.samples)},
+                       seen.measured[slot] - values, (seen.measured - seen.output)[slot],
+                       next(words for words in seen.found.words if "scatter" in words))
+
+    rms_s: float = parameter("s", minimum=0, maximum=10, null=0.0)

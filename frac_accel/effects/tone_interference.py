@@ -21,13 +21,11 @@ class ToneInterference(Effect):
     explanation = "A tone from elsewhere, such as mains hum, is added to the output."
     experiment = "Record at rest: a tone from elsewhere is still there."
 
-    # the phase at a record's end must change by little
-    steps = {"frequency_hz": 1e-8}
-
-    frequency_hz: float = parameter("Hz", above=0)
-    amplitude: float = parameter("output units", minimum=0)
+    # the phase at a record's end must change by little: hence the step
+    frequency_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-6, 1e3), step=1e-8)
+    amplitude: float = parameter("output units", minimum=0, scale="level", null=0.0)
     # of the sine at the record's start
-    phase_rad: float = parameter("rad", default=0.0)
+    phase_rad: float = parameter("rad", default=0.0, scale=1.0)
 
     def simulate(self, values, circumstances):
         return values + self._tone(circumstances)
@@ -60,11 +58,15 @@ class _Tracker:
     """
 
     def __init__(self, effect, sampling_rate_hz):
+        self._effect = effect
         self._turns = effect.frequency_hz / sampling_rate_hz
         self._keep = np.exp(-np.pi * _RELATIVE_WIDTH * self._turns)
         self._power = effect.amplitude**2
         self._sum, self._squares = np.zeros(1, complex), np.zeros(1)
         self._first, self._count = None, 0
+
+    def simulate(self, values, circumstances):
+        return self._effect.simulate(values, circumstances)
 
     def invert(self, values, variance, circumstances):
         if not len(values):

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal.windows import tukey
 
 from ..convolution import Convolution
-from ..effects.time_delay import TimeDelay
+from ..effects import identified_effect
 from ..errors import FracAccelError
 from ..model import AxisModel
 from ..uncertainty import UncertainAxis
@@ -125,8 +125,8 @@ def _gradient(core, fit, reference, pair):
     """Derivatives of the model's output by its parameters, shape (p, n)."""
     # the pair's lag belongs to the stamps, not to the sensor
     delay = fit["delay_s"] - pair.lag_s
-    uncertain = UncertainAxis.given(AxisModel(core, (TimeDelay(delay),)), fit.names,
-                                    fit.covariance)
+    uncertain = UncertainAxis.given(AxisModel(core, (identified_effect("delay_s", delay),)),
+                                    fit.names, fit.covariance)
     convolution = Convolution(reference - reference[0], pair.sampling_rate_hz, abs(delay))
     s = convolution.s
     response = core.transfer_function(s) * np.exp(-s * delay)

@@ -1,7 +1,6 @@
 """What an identified structure would have made of the reference."""
 
-from ..effects.offset import Offset
-from ..effects.time_delay import TimeDelay
+from ..effects import identified_effect
 from ..model import SensorModel
 from ..simulation import simulate
 
@@ -26,6 +25,6 @@ def predicted(structure, fit, reference, sampling_rate_hz, lag_s):
         If no model can have these parameters.
     """
     # the pair's lag belongs to the stamps, not to the sensor
-    model = SensorModel(structure.core(fit), [TimeDelay(fit["delay_s"] - lag_s),
-                                              Offset(fit["offset"])])
+    model = SensorModel(structure.core(fit), [identified_effect("delay_s", fit["delay_s"] - lag_s),
+                                              identified_effect("offset", fit["offset"])])
     return simulate(model, reference, sampling_rate_hz, axis="x", initial="steady")

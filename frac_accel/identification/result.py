@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 
 from ..core import Oscillator
-from ..effects.offset import Offset
-from ..effects.time_delay import TimeDelay
+from ..effects import IDENTIFIED, identified_effect
 from ..model import SensorModel
 from ..parameters import parameter_fields, unit_of
 from .arx import ArxFit
@@ -117,9 +116,9 @@ def identification(chosen, reason, datas, records, axis, provenance, agreeing=No
     tests = judge_residual(chosen.structure.core(own), own, data.reference, data.pair)
     validation = fit_validation(tests, own.rmse / data.spread,
                                 chosen.held_out.bands(rate, *excitation.band_hz), agreeing)
-    effects = [TimeDelay(fit["delay_s"])]
+    effects = [identified_effect("delay_s", fit["delay_s"])]
     if abs(fit["offset"]) > _SIGNIFICANT * parameters["offset"]["std"]:
-        effects.append(Offset(fit["offset"]))
+        effects.append(identified_effect("offset", fit["offset"]))
     model = SensorModel(chosen.structure.core(fit), effects, metadata={
         "uncertainties": {name: {"std": entry["std"], "unit": entry["unit"]}
                           for name, entry in parameters.items()},
@@ -150,5 +149,5 @@ def _unit(name):
     if name[1:].isdigit():
         return {"a": "1", "b": unit_of(Oscillator, "sensitivity")}[name[0]]
     # orders and ratios of the general equation belong to no class; they have no unit
-    return next((unit_of(cls, name) for cls in (Oscillator, TimeDelay, Offset)
+    return next((unit_of(cls, name) for cls in (Oscillator, *IDENTIFIED.values())
                  if name in (field.name for field in parameter_fields(cls))), "1")

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from ..convolution import Convolution
+from ..effects import IDENTIFIED
 from ..errors import FracAccelError
 from ..model import AXES
 from ..simulation import static_gain
@@ -116,4 +117,5 @@ def _axis(uncertain, values, rate):
 
 
 def _offset(model):
-    return sum(effect.offset for effect in model.effects if effect.cause == "offset")
+    return sum(effect.offset for effect in model.effects
+               if isinstance(effect, IDENTIFIED["offset"]))

@@ -6,9 +6,8 @@ import numpy as np
 
 from ..core import Arx, FractionalTransferFunction
 from ..core.sensor_form import from_sensor_parameters, sensor_parameters
+from ..effects import IDENTIFIED, effect_of
 from ..effects.base import GAIN
-from ..effects.offset import Offset
-from ..effects.time_delay import TimeDelay
 from ..errors import ModelError
 from ..model import AXES, AxisModel
 from ..parameters import number, parameter_fields
@@ -99,7 +98,7 @@ class UncertainAxis:
             elif cause in effects:
                 effects[cause] = dataclasses.replace(effects[cause], **change)
             else:
-                effects[cause] = {"time_delay": TimeDelay, "offset": Offset}[cause](**change)
+                effects[cause] = effect_of(cause)(**change)
         axis = AxisModel(core, tuple(sorted(effects.values(), key=lambda effect: effect.stage)))
         try:
             axis.effective_core.require_stable("core")
@@ -279,10 +278,8 @@ def for_axis(axis, names, matrix):
 
 def _owner(name):
     """Core or cause that a parameter's name belongs to, and its name there."""
-    if name == "delay_s":
-        return "time_delay", name
-    if name == "offset":
-        return "offset", name
+    if name in IDENTIFIED:
+        return IDENTIFIED[name].cause, name
     cause, dot, key = name.partition(".")
     return (cause, key) if dot else ("core", name)
 
@@ -305,7 +302,7 @@ def _find(axis, name, where):
         part = axis.core
     else:
         part = next((effect for effect in axis.effects if effect.cause == owner), None)
-        if part is None and name in ("delay_s", "offset"):
+        if part is None and name in IDENTIFIED:
             return 0.0, -np.inf, np.inf
         if part is None:
             raise ModelError(f"{where}: {name}: the model has no effect {owner}")

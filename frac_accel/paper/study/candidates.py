@@ -6,8 +6,8 @@ import numpy as np
 
 from ...core import FractionalTransferFunction, Oscillator
 from ...core.principal_sheet import fractional_root
+from ...effects import identified_effect
 from ...effects.low_pass_lag import LowPassLag
-from ...effects.time_delay import TimeDelay
 from ...errors import IdentificationError
 from ...identification.output_error import Fit, fit_output_error
 from ...identification.structures import FractionalStructure, OscillatorStructure
@@ -168,7 +168,7 @@ class Fitted:
             core, effects = self.structure.core(self.fit), []
         if not isinstance(core, Oscillator):
             core.require_stable("core")
-        return SensorModel(core, [*effects, TimeDelay(self.fit["delay_s"])])
+        return SensorModel(core, [*effects, identified_effect("delay_s", self.fit["delay_s"])])
 
     def response(self, frequency_hz):
         """Frequency response, delay included, shape (m,)."""

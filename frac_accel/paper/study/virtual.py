@@ -11,8 +11,8 @@ import dataclasses
 import numpy as np
 
 from ...core import Oscillator
+from ...effects import identified_effect
 from ...effects.low_pass_lag import LowPassLag
-from ...effects.time_delay import TimeDelay
 from ...model import SensorModel
 from ...simulation import simulate
 from .. import published
@@ -57,7 +57,7 @@ class Case:
         """SensorModel that makes the record."""
         links = [LowPassLag(CORNER_HZ)] if self.lagging else []
         return SensorModel(Oscillator(NATURAL_HZ, DAMPING, self.order),
-                           [*links, TimeDelay(DELAY_S)])
+                           [*links, identified_effect("delay_s", DELAY_S)])
 
     def record(self):
         """Reference and sensor, shape (n,) each, from mid-motion."""
