@@ -20,7 +20,7 @@ ERRORS = {"rmse", "nrmse"}
 KEYS = {"verdict": str, "baseline": dict, "findings": list, "extended": dict,
         "unexplained_fraction": float}
 # What the result file has beyond the fixed form.
-FURTHER = {"reason": str, "suspects": list, "integrity": list}
+FURTHER = {"reason": str, "suspects": list, "integrity": list, "established_noise": dict}
 FINDING = {"cause", "parameters", "confidence", "confusable_with", "evidence", "explanation",
            "gain"}
 GAIN = {"held_out_rmse_before", "held_out_rmse_after", "reduction", "ci95"}
@@ -63,7 +63,8 @@ def diagnose(tmp_path, source, model, *options):
 
 def require_form(said):
     """The form that the result file is to have, whatever the verdict."""
-    assert set(said) == {*KEYS, *FURTHER}
+    assert set(said) == {*KEYS, *FURTHER, "cut_off"}
+    assert set(said["established_noise"]) == {"rms", "by"}
     nothing = said["verdict"] == "insufficient_data"
     for key, kind in {**KEYS, **FURTHER}.items():
         assert isinstance(said[key], kind) or (nothing and said[key] is None)

@@ -11,6 +11,7 @@ from ._common import (
     add_report,
     add_topics,
     open_bag,
+    positive,
     progress,
     provenance,
     require_output,
@@ -30,6 +31,12 @@ def add_arguments(parser):
                         help="topic of the temperature, where there is one (default: %(default)s)")
     parser.add_argument("--extended-model", metavar="E.yaml",
                         help="write the model with what was found")
+    parser.add_argument("--noise-std", type=positive, metavar="STD",
+                        help="standard deviation of the sensor's noise, where it is known "
+                             "[output units]")
+    parser.add_argument("--time-limit", type=positive, default=60.0, metavar="SECONDS",
+                        help="processor time after which the search ends and says what it left "
+                             "out (default: %(default)g)")
     add_report(parser)
     add_json(parser)
 
@@ -51,7 +58,8 @@ def run(arguments):
               "temperature cannot be found", file=sys.stderr)
     with progress(None, unit="step") as bar:
         found = diagnose(arguments.bag, model, arguments.axis, temperature, arguments.reference,
-                         arguments.sensor, lambda words: step(bar, words))
+                         arguments.sensor, lambda words: step(bar, words),
+                         arguments.noise_std, arguments.time_limit)
     print(table(found, arguments.axis))
     command = f"frac_accel diagnose {arguments.bag} --axis {arguments.axis}" + (
         f" --model {arguments.model}" if arguments.model else "")
@@ -84,7 +92,10 @@ def table(found, axis):
                          f"{entry['unit']}")
         lines += [f"  {words}" for words in finding.evidence]
     for suspect in found.suspects:
-        lines += [f"suspected: {' or '.join(suspect['causes'])}", f"  {suspect['experiment']}"]
+        lines += [f"suspected: {' or '.join(suspect['causes'])}: {suspect['reason']}",
+                  f"  {suspect['experiment']}"]
+    if found.cut_off:
+        lines.append(found.cut_off)
     if found.findings:
         lines.append(f"the extended model leaves {found.extended['rmse']:.4g} "
                      f"({found.extended['nrmse']:.3%}); {found.unexplained_fraction:.1%} of the "

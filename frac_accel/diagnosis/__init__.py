@@ -1,5 +1,6 @@
 """What a simulation gets wrong, which cause explains it, and what the extended model gains."""
 
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,11 @@ from ..pair import Pair
 from ..simulation import AxisSimulator
 from . import integrity
 from .engine import Engine
-from .judgement import Diagnosis, Finding, insufficient, judge
+from .judgement import Diagnosis, EstablishedNoise, Finding, insufficient, judge
 from .leftover import related
 from .record import Record
+from .spikes import spikes
+from .time_limit import TimeLimit
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
 
@@ -33,7 +36,7 @@ _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
 
 def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE_TOPIC,
-             sensor=RAW_TOPIC, progress=None):
+             sensor=RAW_TOPIC, progress=None, noise_std=None, time_limit_s=float("inf")):
     """Find what a simulation gets wrong, and why.
 
     Parameters
@@ -49,6 +52,10 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
         Topics, where `source` is a bag.
     progress : callable, optional
         Called with a few words before each step.
+    noise_std : float, optional
+        Standard deviation of the sensor's noise [output units], where it is known.
+    time_limit_s : float
+        Budget of processor time [s]; what it leaves out is said in `Diagnosis.cut_off`.
 
     Returns
     -------
@@ -61,6 +68,7 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
         model can be identified although the excitation would do.
     """
     progress = progress or (lambda words: None)
+    limit = TimeLimit(time_limit_s)
     if isinstance(source, (str, Path)):
         topics = read_bag(source, [reference, sensor])
         source = topics[reference], topics[sensor]
@@ -75,6 +83,8 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     found.words.extend(notes)
     shown = _shown(found, record.sensor[:, column])
     used = record.valid & moving
+    stray = used & spikes(record.sensor[:, column], record.reference[:, column])
+    used &= ~stray
     for effect in shown.values():
         used &= ~effect.spoiled(record.sensor[:, column])
     split = learning_length(record.reference[:, column])
@@ -95,12 +105,32 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
         stds = _stated(model, axis)
     # the common lag of the stamps is a median of scattered ones
     loose = _left_open(model.axis(axis), stds, 1.25 * found.jitter_rms_s / np.sqrt(found.samples))
-    engine = Engine(record, column, model, used,
-                    {cause: entry.effect for cause, entry in loose.items()},
-                    [cause for cause, effect in known_effects().items()
-                     if not effect.read_off], progress, found.step)
+    engine = functools.partial(
+        Engine, record, column, model, base={cause: entry.effect for cause, entry in loose.items()},
+        candidates=[cause for cause, effect in known_effects().items() if not effect.read_off],
+        log=progress, step=found.step, limit=limit)
+    engine, stray = _without_spikes(engine, used, stray, record.reference[:, column])
+    if stray.any():
+        found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
+                           "not: spikes, which count in no fit")
     _require_relation(engine, axis, seed)
-    return judge(engine, engine.run(seed), found, shown, loose, source[1])
+    return judge(engine, engine.run(seed), found, shown, loose, source[1],
+                 _stated_noise(noise_std))
+
+
+def _without_spikes(engine, used, stray, reference):
+    """Engine whose fits leave out what stands out of the residual, too; and all that they do."""
+    first = engine(used=used)
+    more = used & spikes(first.search.fit(first.search.base).residual, reference)
+    return (engine(used=used & ~more) if more.any() else first), stray | more
+
+
+def _stated_noise(std):
+    if std is None:
+        return None
+    if not (np.isfinite(std) and std > 0):
+        raise FracAccelError(f"noise_std: {std} given, expected a number above 0")
+    return EstablishedNoise(float(std), "stated")
 
 
 def _shown(found, measured):

@@ -6,6 +6,8 @@ import numpy as np
 from scipy.fft import rfft
 from scipy.ndimage import uniform_filter1d
 
+from ..effects import effect_of
+from ..errors import FracAccelError
 from ..identification.excitation import (
     alternating_stretches,
     learning_length,
@@ -14,6 +16,7 @@ from ..identification.excitation import (
 from ..identification.uncertainty import sandwich
 from .gain import gain
 from .leftover import leftover
+from .names import special_case
 from .problem import Problem
 from .search import Search
 
@@ -28,6 +31,13 @@ _QUIET_END = 0.5
 _STRETCHES = 20
 # Parts of the record in which a cause's strength is compared.
 _PARTS = 5
+# Causes that the whole of a long record may add to those of its part.
+_SLOW = 2
+# Variances of the noise within which two sets that say nearly the same count as equal.
+_CLOSE = 30.0
+# Standard uncertainties, and share of its size, by which a parameter may differ between halves.
+_AGREE = 5.0
+_ALIKE = 0.1
 # Share of the residual's power for which a coarse lattice must account.
 _COARSE = 0.2
 
@@ -58,8 +68,11 @@ class Engine:
     The measured values may have a lattice with a known `step`.
     """
 
-    def __init__(self, record, axis, baseline, used, base=None, candidates=(), log=None, step=None):
-        self.problem = Problem(record, axis, baseline, used)
+    def __init__(self, record, axis, baseline, used, base=None, candidates=(), log=None, step=None,
+                 limit=None):
+        self.problem = Problem(record, axis, baseline, used, limit)
+        self._part = None
+        self.uncontested, self.best = set(), None
         self._step = step
         self._wanted = used
         self.search = Search(self.problem, base, candidates, log)
@@ -91,13 +104,19 @@ class Engine:
         if len(p.record) > _LONG:
             # where the motion is strongest is enough to find most causes
             part = strongest_stretch(p.record.reference[:, p.axis], _LONG // 2)
-            found = Engine(p.record.part(part), p.axis, p.baseline, self._wanted[part],
-                           self.search.base, self.search.candidates, self.search.log,
-                           self._step).run(seed)
+            self._part = Engine(p.record.part(part), p.axis, p.baseline, self._wanted[part],
+                                self.search.base, self.search.candidates, self.search.log,
+                                self._step, p.limit)
+            found = self._part.run(seed)
+            self.uncontested = self._part.uncontested
             seed = {cause: effect for cause, effect in found.effects.items()
                     if cause not in self.search.base}
-            return self.search.run(self.threshold, self.noise_only, seed, most=1)
-        return self.compete(self.search.run(self.threshold, self.noise_only, seed))
+            # what a part shows is sought there; the whole is searched for what takes time to show
+            self.search.candidates = [cause for cause in self.search.candidates
+                                      if effect_of(cause).shows_with_time]
+            return self.search.run(self.threshold, self.noise_only, seed, most=_SLOW)
+        self.best = self.compete(self.search.run(self.threshold, self.noise_only, seed))
+        return self.best
 
     def score(self, fitted, variance):
         """Cost with a penalty for each parameter, in units of the noise's variance."""
@@ -109,34 +128,61 @@ class Engine:
             for cause in best.effects:
                 if cause in self.search.base:
                     continue
+                if self.problem.limit.ends_search("not every cause met its rivals"):
+                    self.uncontested.add(cause)
+                    continue
                 less = self.search.without(best, cause, best.cost + self.threshold(best))
                 self.search.fit_all([{**less.effects, rival: begin} for _, rival, begin in
                                      self.search.screen(less)[:_RIVALS] if rival != cause]
                                     + [best.effects])
             variance = best.cost / self.problem.count
-            winner = min((fit for fit in self.search.fits.values()
-                          if len(fit.effects) <= len(best.effects)),
-                         key=lambda fit: self.score(fit, variance))
+            near = sorted((fit for fit in self.search.fits.values()
+                           if len(fit.effects) <= len(best.effects)),
+                          key=lambda fit: self.score(fit, variance))
+            winner = self._general(near, variance)
             if winner is best:
                 return best
             best = winner
         return best
 
+    def _general(self, near, variance):
+        """The first of some fits by score; where it is a special case of one close behind, that."""
+        first = near[0]
+        if not self.special_cases(first):
+            return first
+        limit = self.score(first, variance) + _CLOSE
+        return next((fit for fit in near[1:] if self.score(fit, variance) < limit
+                     and not self.special_cases(fit)), first)
+
+    def special_cases(self, fitted):
+        """Causes of a fit that are, within their uncertainty, a simpler one's; with words."""
+        if not any(effect.nested for effect in fitted.effects.values()):
+            return {}
+        stds, core = self.uncertainties(fitted), self.problem.baseline.axis(self.problem.axis).core
+        found = {cause: special_case(effect, stds.get(cause, {}), core)
+                 for cause, effect in fitted.effects.items()}
+        return {cause: words for cause, words in found.items() if words}
+
     def rivals(self, best, cause):
         """Sets without a cause, no larger than the best, by score; (margin, causes)."""
+        if self._part and cause in self._part.best.effects:
+            return self._part.rivals(self._part.best, cause)
         variance = best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
         own = self.score(best, variance)
         found = [(self.score(fit, variance) - own, fit.causes) for fit in
                  self.search.fits.values()
                  if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
-        return sorted(found, key=lambda entry: entry[0])
+        found = sorted(found, key=lambda entry: entry[0])
+        while found and found[0][0] < _CLOSE and self.special_cases(self.search.fits[found[0][1]]):
+            found.pop(0)  # the same explanation in other words
+        return found
 
     def uncertainties(self, fitted):
         """Standard uncertainties by cause and parameter, for any spectrum of the residual."""
         if not fitted.unknowns:
             return {}
         jacobian = dataclasses.replace(fitted, exact=True).jacobian
-        used = self.problem.used
+        used = fitted.problem.used
         for i, unknown in enumerate(fitted.unknowns):
             value = getattr(fitted.effects[unknown.cause], unknown.name)
             jacobian[:, i] /= value if unknown.logarithmic else unknown.scale
@@ -184,9 +230,7 @@ class Engine:
         the output's size, all with an equal share of it. A cause that only resembles the true one
         is too strong in some and too weak in others.
         """
-        p = self.problem
-        less = {name: effect for name, effect in best.effects.items() if name != cause}
-        added = p.clear(best.simulated - p.simulate(less), best.free)
+        added = self.added(best, cause)
         energy, shared = added**2, added * (best.residual + added)
         worst = 0.0
         for order in (np.arange(len(added)), np.argsort(np.abs(best.simulated))):
@@ -196,6 +240,42 @@ class Engine:
                          / np.maximum(np.bincount(part, energy[order], _PARTS), 1e-300))
             worst = max(worst, float(np.max(np.abs(strengths - 1))))
         return worst
+
+    def added(self, best, cause):
+        """What a cause adds to the output of a fit, all else as it is, where samples count."""
+        p = self.problem
+        less = {name: effect for name, effect in best.effects.items() if name != cause}
+        return p.clear(best.simulated - p.simulate(less), best.free)
+
+    def unstable(self, best):
+        """Causes whose parameters differ between two halves of the record, with words.
+
+        Those that take the whole record to show are left out.
+        """
+        p, halves = self.problem, []
+        # as much of the motion in either
+        energy = np.cumsum(np.where(p.used, best.simulated**2, 0.0))
+        first = energy < energy[-1] / 2
+        for rows in (first, ~first):
+            part = p.restricted(p.used & rows)
+            if part.count < 10 * max(len(best.unknowns), 1):
+                return {}
+            try:
+                fit = part.fit(best.effects, iterations=4)
+            except FracAccelError:
+                return {}
+            halves.append((fit.effects, self.uncertainties(fit)))
+        found = {}
+        for unknown in best.unknowns:
+            if type(best.effects[unknown.cause]).shows_with_time:
+                continue
+            one, other = (getattr(effects[unknown.cause], unknown.name) for effects, _ in halves)
+            spread = np.hypot(*(stds[unknown.cause][unknown.name] for _, stds in halves))
+            size = abs(getattr(best.effects[unknown.cause], unknown.name))
+            if abs(one - other) > max(_AGREE * spread, _ALIKE * size):
+                found[unknown.cause] = (f"{unknown.name} is {one:.4g} in the first half of the "
+                                        f"motion and {other:.4g} in the second")
+        return found
 
     def noise_only(self, fitted):
         """Whether a fit leaves nothing but noise."""

@@ -2,18 +2,28 @@
 
 import dataclasses
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import resample_poly
 
 from ..effects import known_effects
-from ..model import AXES, AxisModel, SensorModel
+from ..model import AXES, AxisModel, SensorModel, is_link
 from ..pair import clean
 from ..parameters import parameter_fields
 from .experiments import separating_experiment
 from .gain import gain
+from .names import cancelling, undetermined
 
+# Share of the output's RMS that may be left without noise being established, and factor by which an
+# error may exceed noise that is.
+_LITTLE = 0.05
+_AS_NOISE = 1.2
+# Share of the excess power that rounds to nothing.
+_NOTHING = 0.0005
+# Standard uncertainties by which a delay below zero is one.
+_ACAUSAL = 3.0
 # Share of the baseline's excess power that may be left where causes are named.
 _LEFT = 0.03
 # Largest deviation of a named cause's strength in parts of a record that holds something else too.
@@ -77,20 +87,24 @@ class Diagnosis:
     Attributes
     ----------
     verdict : str
-        consistent, explained, partly_explained, unexplained or insufficient_data.
+        consistent, explained, partly_explained, unexplained, undecided or insufficient_data.
     reason : str
         The verdict in words.
     baseline, extended : dict of str to float
         ``rmse``, ``nrmse`` on held-out data, ``noise_rms`` [output units].
     findings : list of Finding
     suspects : list of dict
-        ``causes`` that the data cannot tell apart, their ``margin`` in variances of the noise, and
-        the ``experiment`` that would.
+        ``causes`` that the data cannot tell apart, their ``margin`` in variances of the noise, the
+        ``reason`` why they are not named, and the ``experiment`` that would tell.
     unexplained_fraction : float
         What remains above the noise, over the baseline's excess above it (in power).
     model : SensorModel
         The model in use, extended by what was found.
     integrity : Integrity
+    established_noise : dict
+        ``rms`` [output units] and ``by`` (what shows it); None where nothing does.
+    cut_off : str or None
+        What a time limit left out.
     """
 
     verdict: str
@@ -104,10 +118,15 @@ class Diagnosis:
     integrity: object
     engine: object = None
     best: object = None
+    established_noise: dict = dataclasses.field(
+        default_factory=lambda: {"rms": None, "by": None})
+    cut_off: str | None = None
 
     def as_dict(self, model_file=None):
         """As the result file has it."""
-        return {"verdict": self.verdict, "reason": self.reason, "baseline": self.baseline,
+        return {"verdict": self.verdict, "reason": self.reason,
+                "established_noise": self.established_noise, "cut_off": self.cut_off,
+                "baseline": self.baseline,
                 "findings": [finding.as_dict() for finding in self.findings],
                 "suspects": self.suspects,
                 "extended": {**self.extended, "model": model_file},
@@ -121,6 +140,25 @@ def insufficient(reason, model, found):
     errors = {"rmse": nan, "nrmse": nan}
     return Diagnosis("insufficient_data", reason, {**errors, "noise_rms": nan}, [], [], errors, nan,
                      model, found)
+
+
+class EstablishedNoise(NamedTuple):
+    """Noise that something other than a model's own residual shows.
+
+    Attributes
+    ----------
+    rms : float
+        [output units]
+    by : str
+        rest, covariance, periods, stated or second_sensor.
+    """
+
+    rms: float
+    by: str
+
+    def as_dict(self):
+        """As the result file has it."""
+        return self._asdict()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -162,7 +200,7 @@ class Seen:
                                           len(self.output) - 1))
 
 
-def judge(engine, best, found, shown, loose, sensor):
+def judge(engine, best, found, shown, loose, sensor, noise=None):
     """Verdict on the best set of causes.
 
     Parameters
@@ -176,24 +214,17 @@ def judge(engine, best, found, shown, loose, sensor):
         Causes that were free in every fit.
     sensor : Samples
         The sensor's samples as they were recorded.
+    noise : EstablishedNoise, optional
+        What the record shows, or somebody says, of its noise.
 
     Returns
     -------
     Diagnosis
     """
-    base = engine.search.base
-    gains = {}
-    while True:
-        gains = {cause: engine.held_out(best, cause)
-                 for cause in best.effects if cause not in base}
-        idle = [cause for cause, g in gains.items()
-                if g.reduction < _RELEVANT or g.ci95[0] <= 0]
-        if not idle:
-            break
-        less = engine.search.without(best, min(idle, key=lambda cause: gains[cause].reduction))
-        best = engine.search.fit(less.effects)
+    best, gains = _relevant(engine, best)
     left = engine.left(best)
     stds = engine.uncertainties(best)
+    doubts = _doubts(engine, best, gains, stds, left, noise)
     findings, suspects = [], []
     for cause, g in gains.items():
         rivals = engine.rivals(best, cause)
@@ -202,49 +233,101 @@ def judge(engine, best, found, shown, loose, sensor):
         entry = Finding(best.effects[cause], stds[cause], _confidence(margin),
                         instead if margin < 10 * _CLEAR else [],
                         _evidence(cause, g, margin, instead), g)
-        if margin > _CLEAR:
+        if cause in doubts:
+            suspects.append(_suspect({cause}, 0.0, doubts[cause]))
+        elif margin > _CLEAR:
             findings.append(entry)
         else:
-            suspects.append(_suspect({cause, *instead}, margin))
+            suspects.append(_suspect({cause, *instead}, margin, "another cause explains as much"))
     findings += _moved(engine, best, loose, stds)
     findings += _read_off(engine, best, found, shown, sensor)
-    return _verdict(engine, best, left, findings, suspects, found)
+    return _verdict(engine, best, left, findings, suspects, found, noise)
 
 
-def _suspect(causes, margin):
-    return {"causes": sorted(causes), "margin": float(margin),
+def _relevant(engine, best):
+    """A fit without the causes that explain nothing of held-out data, and the gains of the rest."""
+    base = engine.search.base
+    while True:
+        gains = {cause: engine.held_out(best, cause)
+                 for cause in best.effects if cause not in base}
+        idle = [cause for cause, g in gains.items()
+                if g.reduction < _RELEVANT or g.ci95[0] <= 0]
+        if not idle:
+            return best, gains
+        less = engine.search.without(best, min(idle, key=lambda cause: gains[cause].reduction))
+        best = engine.search.fit(less.effects)
+
+
+def _doubts(engine, best, gains, stds, left, noise):
+    """Why fitted causes are not named, in words by cause."""
+    p = engine.problem
+    core = p.baseline.axis(p.axis).core
+    doubts = dict.fromkeys(engine.uncontested, "the time limit left no time for its rivals")
+    for cause in gains:
+        places = [(u, place) for u, place in zip(best.unknowns, best.theta) if u.cause == cause]
+        words = undetermined(best.effects[cause], *zip(*places), stds[cause], core)
+        if words:
+            doubts[cause] = words
+    for cause, words in _acausal(engine, best, stds).items():
+        doubts.setdefault(cause, words)
+    for pair in cancelling({cause: engine.added(best, cause) for cause in gains}):
+        for cause, other in (pair, pair[::-1]):
+            doubts.setdefault(cause, f"it nearly cancels {other}: together they may stand for "
+                                     "one cause that is not known")
+    if gains and (left.share > 0 or not _accounted(_rms(best.residual, p.used), p, noise)):
+        for cause, words in engine.unstable(best).items():
+            doubts.setdefault(cause, words)
+    return {cause: words for cause, words in doubts.items() if cause in gains}
+
+
+def _acausal(engine, best, stds):
+    """Links that stand beside a delay below zero: it takes back what they say too much."""
+    p, base = engine.problem, engine.search.base
+    links = [cause for cause, effect in best.effects.items() if cause not in base
+             and (is_link(effect) or effect.pure_delay_s()) and not effect.is_constant]
+    delay = p.axis_model(best.effects).delay_s - p.record.lag_s
+    std = max((stds.get(cause, {}).get("delay_s", 0.0) for cause in links), default=0.0)
+    if len(links) < 2 or delay > -_ACAUSAL * std or delay >= 0:
+        return {}
+    return dict.fromkeys(links, f"together they come to a delay of {delay:.3g} s, which no sensor "
+                                "has: they imitate something else")
+
+
+def _accounted(rmse, problem, noise):
+    """Whether an error is small, or no larger than noise that is established."""
+    spread = float(np.std(problem.measured[problem.used]))
+    return rmse <= _LITTLE * spread or (noise is not None and rmse <= _AS_NOISE * noise.rms)
+
+
+def _suspect(causes, margin, reason):
+    return {"causes": sorted(causes), "margin": float(margin), "reason": reason,
             "experiment": separating_experiment(causes)}
 
 
-def _verdict(engine, best, left, findings, suspects, found):
+def _verdict(engine, best, left, findings, suspects, found, noise):
     p = engine.problem
     rest = engine.held_out_rows
-    measured = p.measured[rest]
-    spread = float(np.std(measured))
+    spread = float(np.std(p.measured[rest]))
     baseline = engine.search.fit(engine.search.base)
-    errors = {"baseline": _rms(p.measured - baseline.output, rest),
-              "extended": _rms(p.measured - engine.learnt(best).output, rest)}
-    noise = left.noise_rms
-    excess = max(baseline.cost / p.count - noise**2, 0.0)
-    remains = max(best.cost / p.count - noise**2, 0.0)
+    before = _rms(p.measured - baseline.output, rest)
+    noise_rms = left.noise_rms
+    excess = max(baseline.cost / p.count - noise_rms**2, 0.0)
+
+    def remaining(fitted):
+        power = max(fitted.cost / p.count - noise_rms**2, 0.0)
+        return power / excess if excess > 0 else 0.0
+
     # differences that chance makes are no remains
-    fraction = remains / excess if left.share > 0 and excess > 0 else 0.0
+    fraction = remaining(best) if left.share > 0 else 0.0
     if left.share > 0:
         # something is left, which the causes may have been bent by, or mistaken for
         doubtful = {f.cause for f in findings if f.cause in best.effects
                     and (fraction > _LEFT or engine.unsteadiness(best, f.cause) > _STEADY)}
-        suspects += [_suspect({cause}, 0.0) for cause in sorted(doubtful)]
+        suspects += [_suspect({cause}, 0.0, "too much is left that it does not explain")
+                     for cause in sorted(doubtful)]
         findings = [f for f in findings if f.cause not in doubtful]
     named = {f.cause for f in findings}
     complete = {c for c in best.effects if c not in engine.search.base} <= named
-    if not findings and not suspects and left.share == 0:
-        verdict, reason = "consistent", "the model explains the record down to its noise"
-    elif findings and complete and left.share <= _MOSTLY_NOISE:
-        verdict, reason = "explained", "the named causes explain the record down to its noise"
-    elif findings:
-        verdict, reason = "partly_explained", "the named causes leave a part unexplained"
-    else:
-        verdict, reason = "unexplained", "no known cause explains what the model gets wrong"
     fitted = best
     if not complete:
         # what is not named is not in the model, and the rest is fitted without it
@@ -253,16 +336,48 @@ def _verdict(engine, best, left, findings, suspects, found):
         stds = engine.uncertainties(fitted)
         findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
                     if f.cause in fitted.effects else f for f in findings]
-        errors["extended"] = _rms(p.measured - engine.learnt(fitted).output, rest)
-        remains = max(fitted.cost / p.count - noise**2, 0.0)
-        fraction = remains / excess if excess > 0 else 0.0
+        fraction = remaining(fitted)
+    after = _rms(p.measured - engine.learnt(fitted).output, rest)
+    # what the record shows by itself, such as scattered stamps, is no part of the model
+    by_itself = [f.gain.after for f in findings if f.cause not in fitted.effects]
+    accounted = _accounted(min([after, *by_itself]), p, noise)
+    verdict = _word(findings, suspects, complete, left.share, fraction, accounted)
     model = _extended(engine, {**fitted.effects, **{f.cause: f.effect for f in findings}})
     return Diagnosis(
-        verdict, reason,
-        {"rmse": errors["baseline"], "nrmse": errors["baseline"] / spread, "noise_rms": noise},
+        verdict, _reason(verdict, after / spread, noise, accounted),
+        {"rmse": before, "nrmse": before / spread, "noise_rms": noise_rms},
         findings, suspects,
-        {"rmse": errors["extended"], "nrmse": errors["extended"] / spread},
-        float(min(fraction, 1.0)), model, found, engine, best)
+        {"rmse": after, "nrmse": after / spread},
+        float(min(fraction, 1.0)), model, found, engine, best,
+        noise.as_dict() if noise else {"rms": None, "by": None}, p.limit.summary())
+
+
+def _word(findings, suspects, complete, share, fraction, accounted):
+    if not findings and not suspects and share == 0:
+        return "consistent" if accounted else "undecided"
+    nothing = fraction < _NOTHING
+    if findings and (nothing or complete and share <= _MOSTLY_NOISE):
+        return "explained" if accounted else "undecided"
+    if findings:
+        return "partly_explained"
+    return "unexplained"
+
+
+def _reason(verdict, nrmse, noise, accounted):
+    known = noise is not None and accounted and nrmse > 0
+    to = {"rest": "down to the noise that it shows at rest",
+          "covariance": "down to the noise that its messages state",
+          "periods": "down to the noise that its repeated periods show",
+          "stated": "down to the noise that was stated",
+          "second_sensor": "down to the noise that the second sensor shows",
+          }[noise.by] if known else f"up to {nrmse:.2%} of the output"
+    return {"consistent": f"the model explains the record {to}",
+            "explained": f"the named causes explain the record {to}",
+            "partly_explained": "the named causes leave a part unexplained",
+            "unexplained": "no known cause explains what the model gets wrong",
+            "undecided": f"{nrmse:.1%} of the output is unaccounted for; nothing in the record "
+                         "shows that it is noise; record the sensor at rest too, or repeat the "
+                         "same motion, or state its noise (--noise-std)"}[verdict]
 
 
 def _extended(engine, effects):

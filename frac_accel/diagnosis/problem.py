@@ -13,6 +13,7 @@ from ..errors import FracAccelError
 from ..model import AXES, AxisModel, is_link
 from ..parameters import Scales, parameter_fields
 from ..simulation import AxisSimulator, kept
+from .time_limit import TimeLimit
 
 # Samples at both ends that the band-limited simulation cannot know.
 _EDGE = 64
@@ -72,6 +73,13 @@ class Point(NamedTuple):
     cost: float
 
 
+class Kept(NamedTuple):
+    """What stays of a `Point` whose arrays are let go, until they are asked for again."""
+
+    effects: dict
+    cost: float
+
+
 @dataclasses.dataclass(eq=False)
 class Fitted:
     """Causes with the parameters that describe a record best.
@@ -79,7 +87,7 @@ class Fitted:
     Attributes
     ----------
     problem : Problem
-    point : Point
+    point : Point or Kept
         Its attributes are those of the fit, too.
     unknowns : tuple of Unknown
     theta : ndarray, shape (p,)
@@ -94,7 +102,7 @@ class Fitted:
     """
 
     problem: "Problem"
-    point: Point
+    point: Point | Kept
     unknowns: tuple
     theta: np.ndarray
     settled: bool = False
@@ -103,11 +111,23 @@ class Fitted:
     trust: float = 1.0
 
     effects = property(lambda self: self.point.effects)
-    simulated = property(lambda self: self.point.simulated)
-    output = property(lambda self: self.simulated + self.point.columns @ self.point.left)
-    free = property(lambda self: self.point.free)
-    residual = property(lambda self: self.point.residual)
     cost = property(lambda self: self.point.cost)
+    simulated = property(lambda self: self.whole.simulated)
+    output = property(lambda self: self.simulated + self.whole.columns @ self.whole.left)
+    free = property(lambda self: self.whole.free)
+    residual = property(lambda self: self.whole.residual)
+
+    @property
+    def whole(self):
+        """The `Point`, made again where its arrays were let go."""
+        if not isinstance(self.point, Point):
+            self.point = self.problem.point(self.point.effects, self.rough)
+        return self.point
+
+    def let_go(self):
+        """Keep no arrays; they are made again when asked for."""
+        self.point = Kept(self.effects, self.cost)
+        self.__dict__.pop("jacobian", None)
 
     @property
     def causes(self):
@@ -131,12 +151,14 @@ class Problem:
         The model in use.
     used : ndarray of bool, shape (n,)
         Samples that count.
+    limit : TimeLimit, optional
     """
 
-    def __init__(self, record, axis, baseline, used):
+    def __init__(self, record, axis, baseline, used, limit=None):
         self.record, self.axis, self.baseline = record, axis, baseline
+        self.limit = limit or TimeLimit()
         self.rate = record.sampling_rate_hz
-        self.time = np.arange(len(record)) / self.rate
+        self.time = np.arange(len(record)) / self.rate  # since this part's start
         self.measured = record.sensor[:, axis]
         self.used = used.copy()
         edge = min(_EDGE, len(record) // 16)
@@ -156,7 +178,8 @@ class Problem:
         if (axis, steps) not in self._simulators:
             self._simulators[axis, steps] = AxisSimulator(
                 self.record.reference[:, axis], self.rate, self.record.temperature_c,
-                steps_per_sample=steps, lag_s=self.record.lag_s)
+                start_time_s=self.record.since_start_s, steps_per_sample=steps,
+                lag_s=self.record.lag_s)
         return self._simulators[axis, steps]
 
     def axis_model(self, effects, axis=None):
@@ -316,13 +339,13 @@ class Problem:
         unknowns = tuple(unknown for cause in effects
                          for unknown in self.unknowns(effects[cause]))
         theta = np.array([_to_theta(getattr(effects[u.cause], u.name), u) for u in unknowns])
-        point = self._point(dict(effects), rough)
+        point = self.point(dict(effects), rough)
         return self._improved(Fitted(self, point, unknowns, theta, rough=rough), iterations,
                               hopeless, goal)
 
     def finished(self, fit, hopeless=np.inf, goal=np.inf):
         """A rough fit with the steps and iterations that it was spared; see `fit`."""
-        finer = dataclasses.replace(fit, point=self._point(fit.effects, False), rough=False,
+        finer = dataclasses.replace(fit, point=self.point(fit.effects, False), rough=False,
                                     trust=1.0 if fit.settled else fit.trust)
         finer.jacobian = fit.jacobian
         return self._improved(finer, _ITERATIONS, hopeless, goal)
@@ -332,6 +355,8 @@ class Problem:
         damping, here.settled = 0.0, not here.unknowns
         to_come = _ITERATIONS if here.rough else 0
         for left in reversed(range(iterations if here.unknowns else 0)):
+            if self.limit.ends_judging("fits were not carried to their end"):
+                break
             small = _SMALL_GAIN * here.cost / self.count
             needed = 2 * (here.cost - goal) / (left + 1 + to_come)
             here, there, damping = self._tried(here, damping, small, needed)
@@ -367,7 +392,7 @@ class Problem:
                 break
             theta = np.clip(here.theta + step, low, high)
             try:
-                point = self._point(self.replaced(here.effects, here.unknowns, theta), here.rough)
+                point = self.point(self.replaced(here.effects, here.unknowns, theta), here.rough)
             except FracAccelError:
                 point = None
             if point is not None and point.cost < here.cost:
@@ -383,7 +408,7 @@ class Problem:
             damping = max(10 * damping, 1e-3)
         return here, None, damping
 
-    def _point(self, effects, rough):
+    def point(self, effects, rough):
         """`Point` with these parameters; raises FracAccelError where the motion has no bound."""
         simulated = self.simulate(effects, steps=_STEPS_OF_SLOPES if rough else _STEPS)
         if not np.isfinite(simulated).all():
@@ -398,7 +423,7 @@ class Problem:
 
     def slopes(self, fit):
         """Derivatives of the output by the unknowns of a fit, shape (n, p)."""
-        point, theta = fit.point, fit.theta
+        point, theta = fit.whole, fit.theta
         columns = np.zeros((len(self.record), len(theta)))
         forced = any(map(acts_on_spring, point.effects.values()))
         steps = _STEPS_OF_SLOPES if forced else _STEPS

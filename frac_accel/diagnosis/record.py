@@ -19,6 +19,8 @@ class Record:
         As in `Pair`.
     temperature_c : ndarray, shape (n,), or None
         Temperature [°C] at the instants.
+    since_start_s : float
+        Time [s] from the start of the whole record, of which this may be a part.
     """
 
     sampling_rate_hz: float
@@ -28,6 +30,7 @@ class Record:
     lag_s: float
     temperature_c: np.ndarray | None = None
     start_ns: int = 0
+    since_start_s: float = 0.0
 
     def __len__(self):
         return len(self.valid)
@@ -37,7 +40,8 @@ class Record:
         celsius = None if self.temperature_c is None else self.temperature_c[rows]
         return Record(self.sampling_rate_hz, self.reference[rows], self.sensor[rows],
                       self.valid[rows], self.lag_s, celsius,
-                      self.start_ns + int(rows.start * 1e9 / self.sampling_rate_hz))
+                      self.start_ns + int(rows.start * 1e9 / self.sampling_rate_hz),
+                      self.since_start_s + rows.start / self.sampling_rate_hz)
 
     @classmethod
     def of(cls, reference, sensor, axis="x", temperature=None):

@@ -21,6 +21,8 @@ _STUCK = 0.2
 _TRIAL = 4
 _HOPELESS = 4.0
 _BEHIND = 2.0
+# Fits whose arrays are kept; those of others are made again when asked for.
+_AT_HAND = 8
 # Variances from the best fit of a round within which a fit must come if it goes on as it goes.
 _NEAR = 200.0
 
@@ -36,6 +38,7 @@ class View:
     residual: np.ndarray
     used: np.ndarray
     core: object
+    since_start_s: float
     delay_s: float
     level: float
     warms: bool
@@ -61,7 +64,10 @@ class Search:
         return self.fits[frozenset(effects)]
 
     def _keep(self, fit):
+        self.fits.pop(fit.causes, None)
         self.fits[fit.causes] = fit
+        for older in list(self.fits.values())[-2 * _AT_HAND:-_AT_HAND]:
+            older.let_go()
         self.log(f"fit {sorted(fit.causes - set(self.base))}: {fit.cost:.6g}")
 
     def fit_all(self, sets, best=np.inf, goal=np.inf):
@@ -72,6 +78,8 @@ class Search:
         trials = {}
         for effects in sets:
             key = frozenset(effects)
+            if self.problem.limit.ends_search("some sets of causes were not tried"):
+                break
             try:
                 # a linear motion is cheap enough to be tried in any case
                 costly = any(map(acts_on_spring, effects.values()))
@@ -98,7 +106,7 @@ class Search:
         model = p.axis_model(fitted.effects)
         celsius = p.record.temperature_c
         return View(p.rate, p.time, p.measured, fitted.simulated, fitted.residual, p.used,
-                    model.effective_core, model.delay_s,
+                    model.effective_core, p.record.since_start_s, model.delay_s,
                     float(np.std(fitted.simulated[p.used])),
                     celsius is not None and np.ptp(celsius) > 0.1,
                     p.excited,
@@ -170,10 +178,15 @@ class Search:
             Largest number of causes to be added.
         """
         beam = [self.fit(self.base)]
-        if seed:
-            beam = sorted([*beam, self.fit({**self.base, **seed})], key=lambda fit: fit.cost)
+        seeds = [seed] if seed else []
+        if most > 1 and not done(beam[0]):
+            seeds.append(self._everyday(beam[0]))
+        beam = sorted([*beam, *(self.fit({**self.base, **begin}) for begin in seeds if begin)],
+                      key=lambda fit: fit.cost)
         best = beam[0]
         for added in range(most):
+            if self.problem.limit.ends_search(f"no cause was added to {len(best.causes)}"):
+                break
             wanted = {}
             least = best.cost - threshold(best) if done(best) else np.inf
             for parent in beam:
@@ -191,6 +204,14 @@ class Search:
             if added >= 2 and gained < _STUCK and not done(best):
                 break
         return self.prune(best, threshold)
+
+    def _everyday(self, fitted):
+        """Causes that are common and cheap, each from its best start.
+
+        What is odd must win beside them, lest it be taken for what they would have explained.
+        """
+        return {cause: begin for _, cause, begin in self.screen(fitted)
+                if type(begin).everyday}
 
     def prune(self, best, threshold):
         """Leave out causes without which the record is described as well."""

@@ -98,8 +98,16 @@ class Effect:
     read_off: ClassVar[bool] = False
     # True where one clock or one way to the stamps makes it the same for all axes
     common_to_axes: ClassVar[bool] = False
+    # True for a link that is one number at all frequencies
+    is_constant: ClassVar[bool] = False
     # True for what says anew what the core already says
     restates_core: ClassVar[bool] = False
+    # parameters whose null value makes this cause a special case of a simpler one
+    nested: ClassVar[tuple[str, ...]] = ()
+    # True for what grows along a record, so that a part of it may not show it
+    shows_with_time: ClassVar[bool] = False
+    # True for what is so common and so cheap to fit that every search begins with it, too
+    everyday: ClassVar[bool] = False
     # name among the parameters that `identify` finds beside a core
     identified_as: ClassVar[str | None] = None
 

@@ -14,6 +14,7 @@ class ClockSkew(Effect):
     cause = "clock_skew"
     stage = DELAY
     explanation = "The sensor's clock runs at another rate than the reference's."
+    shows_with_time = True
     experiment = ("Record longer, with a sharp event at the beginning and at the end: a skew lets "
                   "the lag grow from one to the other.")
 

@@ -22,6 +22,7 @@ class FractionalDamping(Effect):
                                      null="core")
 
     restates_core = True
+    nested = ("damping_order",)
 
     def change_core(self, core):
         """Raise ModelError where the core is not an oscillator."""

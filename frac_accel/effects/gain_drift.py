@@ -18,6 +18,7 @@ class GainDrift(Effect):
     cause = "gain_drift"
     stage = GAIN
     explanation = "The sensitivity drifts with time."
+    shows_with_time = True
     experiment = "Keep level and temperature constant for longer: a drift goes on with time."
 
     rate_per_s: float = parameter("1/s", scale="per_duration", null=0.0)

@@ -14,6 +14,8 @@ class Offset(Effect):
     cause = "offset"
     stage = OFFSET
     explanation = "A constant is added to the output."
+    everyday = True
+    shows_with_time = True
     experiment = ("Record at rest, and once more with the sensor turned over: an offset does not "
                   "turn with it.")
 

@@ -16,12 +16,14 @@ class SensitivityError(Effect):
     cause = "sensitivity_error"
     stage = GAIN
     explanation = "The sensitivity differs from the model's by a constant ratio."
+    everyday = True
     experiment = ("Compare with the reference at one frequency far below the resonance: a ratio "
                   "of amplitudes other than 1 there is the sensitivity.")
 
     gain: float = parameter("1", scale=1.0, null=1.0)
 
     restates_core = True
+    is_constant = True
 
     @classmethod
     def left_open(cls, axis_model, stds, stamps_std_s):

@@ -22,6 +22,7 @@ class TemperatureSensitivity(Effect):
     stage = GAIN
     explanation = "The sensitivity changes with temperature."
     needs_temperature = True
+    shows_with_time = True
     experiment = ("Run a temperature cycle at constant excitation, and record the temperature: "
                   "the gain comes back with it, unlike a drift.")
 

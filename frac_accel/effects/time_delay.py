@@ -17,6 +17,7 @@ class TimeDelay(Effect):
     stage = DELAY
     explanation = ("The samples are stamped later (below zero: earlier) than the motion that they "
                    "show.")
+    everyday = True
     experiment = ("Excite a wider band, up to frequencies where a delay of this size turns the "
                   "phase by radians: its phase is a straight line over frequency, and no "
                   "amplitude changes.")

@@ -19,6 +19,7 @@ class ToneInterference(Effect):
     cause = "tone_interference"
     stage = INTERFERENCE
     explanation = "A tone from elsewhere, such as mains hum, is added to the output."
+    shows_with_time = True
     experiment = "Record at rest: a tone from elsewhere is still there."
 
     # the phase at a record's end must change by little: hence the step

@@ -13,7 +13,7 @@ from .signals import sentence
 
 _VERDICTS = {"consistent": "Consistent", "explained": "Explained",
              "partly_explained": "Partly explained", "unexplained": "Unexplained",
-             "insufficient_data": "Insufficient data"}
+             "undecided": "Undecided", "insufficient_data": "Insufficient data"}
 
 
 def diagnosis_page(found, provenance=None):

@@ -1,0 +1,44 @@
+"""Single samples that stand far out of their neighbours while the reference does not move."""
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+# Samples on either side that a spike may reach to.
+_REACH = 3
+# Samples on either side that say how far one may stand out here, and times that a spike stands
+# farther out than the farthest of them (2.4 standard deviations, where it is noise).
+_AROUND = 30
+_TIMES = 5.0
+# Share of the samples above which they are no exception.
+_RARE = 0.02
+
+
+def spikes(sensor, reference):
+    """Mask of the sensor's isolated spikes, empty where so much stands out that it is no exception.
+
+    Parameters
+    ----------
+    sensor, reference : ndarray, shape (n,)
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+    """
+    found = _stands_out(sensor) & ~_stands_out(reference)
+    return found if found.mean() <= _RARE else np.zeros(len(sensor), bool)
+
+
+def _stands_out(values):
+    """Samples that a cubic through the second and third neighbours misses by far."""
+    padded = np.pad(values, _REACH, mode="reflect", reflect_type="odd")
+    n = len(values)
+    at = {k: padded[_REACH + k:_REACH + k + n] for k in (-3, -2, 2, 3)}
+    # Lagrange's polynomial through -3, -2, 2, 3 at 0
+    off = np.abs(values - (0.9 * (at[-2] + at[2]) - 0.4 * (at[-3] + at[3])))
+    # the largest around, but for what the spike itself has spoiled
+    size = _AROUND - 2 * _REACH
+    side = maximum_filter1d(np.pad(off, _AROUND, mode="reflect"), size)
+    shift = _AROUND - size // 2
+    around = np.maximum(side[_AROUND - shift:_AROUND - shift + n],
+                        side[_AROUND + shift:_AROUND + shift + n])
+    return off > _TIMES * np.maximum(around, 1e-9 * np.max(np.abs(values)))

@@ -1,0 +1,51 @@
+"""Budget of processor time: a search that has used it up says what it left out."""
+
+import time
+
+# Share of the budget after which nothing new is tried, so that what is known can be judged.
+_SEARCH = 0.6
+
+
+class TimeLimit:
+    """Counts the processor time of this process from its making.
+
+    Parameters
+    ----------
+    seconds : float
+        Budget; infinite for none.
+
+    Attributes
+    ----------
+    left_out : list of str
+        What was not done because of it, each once.
+    """
+
+    def __init__(self, seconds=float("inf")):
+        self.seconds = seconds
+        self._start = time.process_time()
+        self.left_out = []
+
+    def spent_s(self):
+        """Processor time [s] since the start."""
+        return time.process_time() - self._start
+
+    def ends_search(self, words=None):
+        """Whether the search must end; notes what is left out because of it."""
+        return self._over(_SEARCH, words)
+
+    def ends_judging(self, words=None):
+        """Whether nothing that can be spared is done any more."""
+        return self._over(1.0, words)
+
+    def _over(self, share, words):
+        over = self.spent_s() > share * self.seconds
+        if over and words and words not in self.left_out:
+            self.left_out.append(words)
+        return over
+
+    def summary(self):
+        """What was left out, as a sentence; None where nothing was."""
+        if not self.left_out:
+            return None
+        return (f"the search was cut at its limit of {self.seconds:g} s of processor time: "
+                f"{'; '.join(self.left_out)}")
