@@ -10,8 +10,8 @@ from .errors import FracAccelError
 from .identification.excitation import excited_band
 from .metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
 from .model import AXES
-from .pair import clean, make_pair
-from .samples import Samples
+from .record import Record, Samples
+from .record.clock import usable
 from .simulation import simulate
 
 # A stamp that has been moved by a skew and back.
@@ -91,7 +91,7 @@ def validate(reference, sensor, model, axis="x", temperature_at=None, **wishes):
     FracAccelError
         If the pair cannot be compared.
     """
-    pair = make_pair(reference, sensor, axis)
+    pair = Record.of(reference, sensor, axis)
     corrector = Corrector(model, **wishes)
     parts = [*_corrected(corrector, sensor, temperature_at), corrector.finish()]
     stamps, values = (np.concatenate([getattr(part, name) for part in parts])
@@ -127,9 +127,10 @@ def compare(reference, sensor, corrected, design, axis="x"):
         If the records have too little in common.
     """
     column = AXES.index(axis)
-    pair = make_pair(reference, sensor, axis)
+    pair = Record.of(reference, sensor, axis)
     rate = pair.sampling_rate_hz
-    known = clean(reference)
+    good = usable(reference)
+    known = reference.stamps_ns[good], reference.values[good]
     # the raw sample of a corrected one still has the sensor's delay and skew in its stamp
     raw_stamps = corrected.stamps_ns + design.sensor_delay_ns
     since_start = raw_stamps - sensor.stamps_ns[0]

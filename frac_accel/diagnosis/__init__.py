@@ -1,5 +1,6 @@
 """What a simulation gets wrong, which cause explains it, and what the extended model gains."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,11 @@ from ..errors import FracAccelError, IdentificationError
 from ..identification.excitation import learning_length, require_excitation
 from ..identification.record_checks import moving_samples
 from ..model import AXES, SensorModel
-from ..pair import Pair
+from ..record import Record
 from ..simulation import AxisSimulator
-from . import integrity
 from .engine import Engine
 from .judgement import Diagnosis, Finding, insufficient, judge
 from .leftover import related
-from .record import Record
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
 
@@ -67,11 +66,11 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     column = AXES.index(axis)
     progress("checking the data")
     record = Record.of(*source, axis, temperature)
-    found = integrity.check(source[1], record.sampling_rate_hz, column)
+    found = record.integrity(column)
     if len(record) < _FEWEST:
         return insufficient(f"the record has {len(record)} samples, expected at least {_FEWEST}",
                             model, found)
-    moving, notes = moving_samples(record.reference[:, column], record.sensor[:, column], record)
+    moving, notes = moving_samples(record, column)
     found.words.extend(notes)
     shown = _shown(found, record.sensor[:, column])
     used = record.valid & moving
@@ -114,9 +113,7 @@ def _classical(record, axis, used):
     """Classical core identified from the record, what it knows of it (nothing, since any cause has
     bent it), and the effects that it was identified with."""
     from ..identification import identify
-    pair = Pair(record.sampling_rate_hz, record.reference, record.sensor, used, record.lag_s,
-                record.start_ns, float("nan"))
-    model = identify(pair, axis, "oscillator").model
+    model = identify(dataclasses.replace(record, valid=used), axis, "oscillator").model
     return (SensorModel(model.core), dict.fromkeys(_CORE, np.inf),
             {effect.cause: effect for effect in model.effects})
 

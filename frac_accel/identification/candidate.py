@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import FracAccelError, IdentificationError
 from ..metrics import octave_bands
 from ..model import AXES
-from ..pair import Pair
+from ..record import Record
 from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
 from .direction import exchanged_instead, judge_direction
 from .excitation import learning_length, persistent_excitation, require_order
@@ -43,7 +43,7 @@ class Data:
     """
 
     record: RecordCheck
-    pair: Pair
+    pair: Record
     reference: np.ndarray
     sensor: np.ndarray
     spread: float
