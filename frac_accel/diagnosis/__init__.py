@@ -13,6 +13,7 @@ from ..identification.excitation import learning_length, require_excitation
 from ..identification.record_checks import moving_samples
 from ..model import AXES, SensorModel
 from ..record import Record
+from ..record.orientation import turned_away
 from ..simulation import AxisSimulator
 from .engine import Engine
 from .judgement import Diagnosis, Finding, insufficient, judge
@@ -145,15 +146,9 @@ def _require_relation(engine, axis, seed):
     follows, share = related(p.measured, start, p.used)
     if follows:
         return
-    hint = ""
-    for other in range(3):
-        if other != p.axis and np.ptp(p.record.reference[:, other]):
-            simulated = p.simulator(other).simulate(p.baseline.axis(other))
-            elsewhere, more = related(p.measured, simulated, p.used)
-            if elsewhere and more > 2 * share:
-                hint = f"; it follows the reference's {AXES[other]}: the axes are exchanged"
+    hint = turned_away(p.record, axis) or "they do not belong together"
     raise FracAccelError(f"axis {axis}: the sensor does not follow the reference (they share "
-                         f"{max(share, 0):.2%} of the power); they do not belong together{hint}")
+                         f"{max(share, 0):.2%} of the power); {hint}")
 
 
 def _require_direction(engine, axis, start):

@@ -8,7 +8,7 @@ import importlib
 
 # A running node needs the samples only.
 _HOME = {"Samples": "samples", "Record": "record", "Topic": "topic", "Temperature": "temperature",
-         "Orientation": "orientation", "orientation": "orientation"}
+         "Orientation": "orientation"}
 
 __all__ = sorted(_HOME)
 

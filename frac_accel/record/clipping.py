@@ -18,7 +18,7 @@ from ..errors import IdentificationError
 _FEWEST = 5
 _PILE_UP = 1.5
 _CERTAIN = 4
-_NEXT_VALUES = 3
+_NEXT_VALUES = 2
 # What stands at one value for a larger share of the record rests there.
 _RESTING = 0.4
 # How far beyond the limit the model goes in the middle of the clipped samples: steps of the

@@ -9,13 +9,16 @@ from ..errors import FracAccelError
 from ..model import AXES
 from .clock import usable
 from .pairing import FEWEST, by_slots, by_stamps, same_clock
-from .relation import clock_offset
+from .relation import clock_offset, refined
 from .temperature import Temperature
 from .topic import Topic
 
 # Offset of the clocks [s], and in periods of the motion, from which on it is no sensor's delay.
 _FAR_S = 1.0
 _FAR_PERIODS = 3.0
+# Lead of the sensor that is told: standard uncertainties, and seconds.
+_SIGNIFICANT = 4.0
+_LATE_S = 0.01
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -157,10 +160,6 @@ class Record:
         if offset is not None and _far(offset, one, two):
             taken_out = offset.seconds
             two.shift(-taken_out)
-            words.append(
-                f"the sensor's clock is {abs(taken_out):.6g} +- {offset.std_s:.2g} s "
-                f"{'ahead of' if taken_out > 0 else 'behind'} the reference's by what both "
-                "measure: taken out of its stamps")
         paired = by_slots(one, two) if same_clock(one, two) else by_stamps(one, two)
         stated = sensor.variance[:, column]
         std = np.sqrt(np.nanmean(stated)) if np.isfinite(stated).any() else np.nan
@@ -168,13 +167,22 @@ class Record:
         if np.count_nonzero(paired.valid) < FEWEST // 2:
             raise FracAccelError(f"reference and sensor have {np.count_nonzero(paired.valid)} "
                                  f"instants in common, expected at least {FEWEST}")
+        lag = paired.lag_s
+        if offset is not None:
+            rest = refined(paired.reference, paired.sensor, paired.valid, paired.sampling_rate_hz,
+                           offset.seconds - taken_out - lag, paired.band_hz)
+            if rest is not None:
+                offset = dataclasses.replace(rest, seconds=rest.seconds + lag + taken_out)
+                if taken_out:
+                    taken_out, lag = offset.seconds, -rest.seconds
+            words += _offset_words(offset, taken_out)
         celsius = None
         if temperature is not None:
             instants = np.round(np.arange(last) * 1e9 / paired.sampling_rate_hz).astype(np.int64)
             celsius = Temperature.of(temperature)(
                 paired.start_ns + round(taken_out * 1e9) + instants)
         return cls(paired.sampling_rate_hz, paired.reference[:last], paired.sensor[:last],
-                   paired.valid[:last], paired.lag_s, paired.start_ns, float(std), celsius,
+                   paired.valid[:last], lag, paired.start_ns, float(std), celsius,
                    paired.band_hz, paired.resampled, offset and offset.seconds,
                    offset and offset.std_s, taken_out, (*words, *paired.words), (one, two))
 
@@ -238,6 +246,25 @@ def _require_signal(topic, column):
         hint = f"; there is signal on {' and '.join(others)}" if others else ""
         raise FracAccelError(f"{topic.name}: axis {AXES[column]} is constant at "
                              f"{topic.values[0, column]:g}{hint}")
+
+
+def _offset_words(offset, taken_out):
+    """What is to be said of the clocks: nothing where a sensor's own delay may be behind it."""
+    size = _with_std(abs(offset.seconds), offset.std_s) + " s"
+    if taken_out:
+        later = "ahead of" if offset.seconds > 0 else "behind"
+        return [f"the sensor's clock is {size} {later} the reference's, by what both measure: this "
+                "is taken out of its stamps, and no delay of the sensor can be told"]
+    if offset.seconds < -max(_SIGNIFICANT * offset.std_s, _LATE_S):
+        return [f"the sensor shows the motion {size} before the reference does, which no sensor "
+                "can: the reference's stamps are late, or the sensor's early"]
+    return []
+
+
+def _with_std(value, std):
+    """Value and standard uncertainty with as many digits as that leaves."""
+    digits = max(0, int(np.ceil(-np.log10(max(std, 1e-9)))))
+    return f"{value:.{digits}f} +- {std:.1g}"
 
 
 def _far(offset, one, two):

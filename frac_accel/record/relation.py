@@ -1,4 +1,4 @@
-"""Which way two topics belong together at all: the offset of their clocks, whatever the axes."""
+"""How two topics belong together at all, whatever their axes: the offset of their clocks."""
 
 import dataclasses
 
@@ -7,15 +7,27 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 # Means that a topic is reduced to for the correlation, at most.
 _MEANS = 1 << 16
-# Share of the power of whitened axes that must be common, and how much more of it than chance
-# leaves at the best lag; what is left beside the peak, of it.
-_COMMON = 0.3
-_CHANCE = 30.0
+# Share of the sensor's power that the reference must explain at the peak, what may be explained
+# beside it, of that, and how many times as many lags as the peak is wide must say so.
+_EXPLAINED = 0.3
 _BESIDE = 0.6
+_WIDTHS = 40
 # Axes with less power than this, of the strongest one, do not move.
 _RESTS = 1e-4
-# Blocks that the uncertainty comes from.
-_BLOCKS = 8
+# Blocks of the record that uncertainties come from, and samples that one has at least.
+BLOCKS = 16
+_FEWEST = 8
+# Samples around the first guess of a lag that are tried, and their distance.
+_AROUND = 8
+_FINE = 0.125
+# Stretches [samples] for spectra, the shortest and longest, and their number; probability with
+# which what is not coherent counts; highest frequency [of the sampling rate], and
+# largest coherence, which bounds what one frequency can weigh.
+_SHORTEST, _LONGEST = 16, 2048
+_STRETCHES = 64
+_BY_CHANCE = 1e-3
+_UPPER = 0.4
+_MOST_COHERENT = 0.99
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,21 +37,21 @@ class Offset:
     Attributes
     ----------
     seconds, std_s : float
-        Below zero: the reference's are later. The standard uncertainty is the scatter between
-        eighths of the record.
-    common : float
-        Largest squared correlation that a combination of axes has there.
+        Below zero: the reference's are later.
+    explained : float
+        Share of the sensor's power that the reference's axes explain together at that offset.
     """
 
     seconds: float
     std_s: float
-    common: float
+    explained: float
 
 
 def clock_offset(reference, sensor, origin_ns):
     """Offset at which two topics move alike, or None where the correlation has no clear peak.
 
-    The axes are decorrelated first, so that a sensor that is turned shows the same peak.
+    What all axes of the reference explain together of all of the sensor's does not depend on how
+    the sensor lies.
 
     Parameters
     ----------
@@ -50,37 +62,141 @@ def clock_offset(reference, sensor, origin_ns):
     Returns
     -------
     Offset or None
+        To an interval of the slower topic; `refined` knows it better.
     """
     topics = reference, sensor
     starts = [(int(topic.stamps_ns[0]) - origin_ns) * 1e-9 for topic in topics]
     spans = [float(topic.stamps_ns[-1] - topic.stamps_ns[0]) * 1e-9 for topic in topics]
     interval = max(1 / min(topic.clock.rate_hz for topic in topics), max(spans) / _MEANS)
-    one, two = (_whitened(_means(topic, interval)) for topic in topics)
-    if one is None or two is None:
+    one, two = (_means(topic, interval) for topic in topics)
+    one = _whitened(one)
+    moves = np.ptp(two, axis=0) > 0
+    if one is None or not moves.any():
         return None
+    two = two[:, moves] - two[:, moves].mean(axis=0)
     length = next_fast_len(len(one) + len(two), real=True)
-    spectra = [rfft(values, length, axis=0) for values in (one, two)]
-    common = sum(irfft(np.conj(x) * y, length)**2 for x in spectra[0].T for y in spectra[1].T)
-    common /= min(len(one), len(two))**2
-    lags = np.r_[0:len(two), -(len(one) - 1):0]
-    order = np.argsort(lags, kind="stable")
-    lags, common = lags[order], common[lags[order]]
-    peak = int(np.argmax(common))
-    if not 0 < peak < len(common) - 1 or not _clear(common, peak, spectra, len(one) + len(two)):
+    moving, answer = (rfft(values, length, axis=0) for values in (one, two))
+    explained = sum(irfft(np.conj(x) * y, length)**2 for x in moving.T for y in answer.T)
+    explained /= len(one) * np.sum(two**2)
+    # lags in ascending order
+    explained = np.r_[explained[-(len(one) - 1):], explained[:len(two)]]
+    peak = int(np.argmax(explained))
+    if not 0 < peak < len(explained) - 1 or not _clear(explained, peak):
         return None
-    lag = lags[peak] + _vertex(common[peak - 1:peak + 2])
-    std = _scatter(one, two, int(lags[peak]))
-    return Offset(float(starts[1] - starts[0] + lag * interval), float(std * interval),
-                  float(common[peak]))
+    lag = peak - (len(one) - 1) + _vertex(explained[peak - 1:peak + 2])
+    return Offset(float(starts[1] - starts[0] + lag * interval), interval, float(explained[peak]))
+
+
+def refined(reference, sensor, valid, sampling_rate_hz, guess_s, band_hz=None):
+    """Offset near a guess, from samples on the same instants.
+
+    The delay of greatest likelihood between each of the sensor's axes and what the reference's axes
+    together predict of it: the phase counts by its frequency and coherence (C. H. Knapp, G. C.
+    Carter, *IEEE Trans. ASSP* 24 (1976) 320-327; "HT processor").
+
+    Parameters
+    ----------
+    reference, sensor : ndarray, shape (n, 3)
+    valid : ndarray of bool, shape (n,)
+    sampling_rate_hz, guess_s : float
+    band_hz : float, optional
+        Highest frequency that counts.
+
+    Returns
+    -------
+    Offset or None
+        With the standard uncertainty of a jackknife over stretches of the record; None where
+        nothing is coherent, the best is at the end of what is tried, or too little is left.
+    """
+    middle = round(guess_s * sampling_rate_hz)
+    sums = products(reference, sensor, valid, np.array([middle]))
+    if sums is None:
+        return None
+    own, shared, other = (part.sum(axis=0)[0] for part in sums)
+    share = _explained(own[None], shared[None], other[None])[0]
+    map_ = np.linalg.pinv(own, rcond=_RESTS, hermitian=True) @ shared
+    first, last = max(0, -middle), len(valid) - max(0, middle)
+    size = min(_LONGEST, max(_SHORTEST, 2 * (last - first) // (_STRETCHES + 1)))
+    starts = np.linspace(first, last - size, _STRETCHES).astype(int)
+    means = [values[valid].mean(axis=0) for values in (reference, sensor)]
+    window = np.hanning(size)[:, None]
+    cross, powers = [], []
+    for start in starts:
+        x, y = (np.where(valid[at:at + size, None], values[at:at + size] - mean, 0.0) * window
+                for values, at, mean in zip((reference, sensor), (start, start + middle), means))
+        x, y = rfft(x @ map_, axis=0), rfft(y, axis=0)
+        cross.append(np.conj(x) * y)
+        powers.append([np.abs(x)**2, np.abs(y)**2])
+    cross, powers = np.array(cross), np.sum(powers, axis=0)
+    total = cross.sum(axis=0)
+    # what chance makes of so many stretches, half of each in the next one
+    least = 1 - _BY_CHANCE**(2 / (min(_STRETCHES, 2 * (last - first) / size) - 1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        coherence = np.nan_to_num(np.abs(total)**2 / (powers[0] * powers[1]))
+        coherence = np.where(coherence > least, np.minimum(coherence, _MOST_COHERENT), 0.0)
+        weight = np.nan_to_num(coherence / (1 - coherence) / np.abs(total))
+    frequency = np.fft.rfftfreq(size, 1 / sampling_rate_hz)
+    weight[(frequency > (band_hz or _UPPER * sampling_rate_hz)) | (frequency == 0)] = 0
+    lags = np.arange(-_AROUND, _AROUND + _FINE / 2, _FINE)
+    turn = np.exp(2j * np.pi * np.outer(lags, frequency) / sampling_rate_hz)
+    curves = np.real((cross * weight).sum(axis=2) @ turn.T)
+    curve = curves.sum(axis=0)
+    peak = int(np.argmax(curve))
+    if not 0 < peak < len(lags) - 1 or not weight.any():
+        return None
+    tries = []
+    for one in curves:
+        rest = curve - one
+        at = int(np.clip(np.argmax(rest), 1, len(lags) - 2))
+        tries.append(lags[at] + _FINE * _vertex(rest[at - 1:at + 2]))
+    std = np.sqrt((len(starts) - 1) * np.var(tries))
+    lag = middle + lags[peak] + _FINE * _vertex(curve[peak - 1:peak + 2])
+    return Offset(float(lag / sampling_rate_hz), float(std / sampling_rate_hz), float(share))
+
+
+def products(reference, sensor, valid, lags):
+    """Sums of products by blocks of the record, for each lag [samples] of the sensor.
+
+    Returns
+    -------
+    tuple of ndarray, or None
+        Reference with reference, shape (blocks, 1, 3, 3), reference with sensor, shape
+        (blocks, lags, 3, 3), and sensor with sensor, as the first; means are taken off.
+    """
+    n = len(valid)
+    first, last = max(0, -int(lags[0])), n - max(0, int(lags[-1]))
+    if last - first < BLOCKS * _FEWEST:
+        return None
+    x, y = (np.where(valid[:, None], values - values[valid].mean(axis=0), 0.0)
+            for values in (reference, sensor))
+    edges = np.linspace(first, last, BLOCKS + 1).astype(int)
+    own, shared, other = [], [], []
+    for start, stop in zip(edges[:-1], edges[1:]):
+        part = x[start:stop]
+        middle = y[start + int(lags[len(lags) // 2]):][:stop - start]
+        own.append([part.T @ part])
+        shared.append([part.T @ y[start + lag:stop + lag] for lag in lags.tolist()])
+        other.append([middle.T @ middle])
+    return np.array(own), np.array(shared), np.array(other)
+
+
+def _explained(own, shared, other):
+    """Share of the sensor's power that the reference explains, by lag."""
+    power, turn = np.linalg.eigh(own[0])
+    moves = power > _RESTS * power[-1]
+    turned = turn[:, moves].T / np.sqrt(power[moves])[:, None]
+    return np.sum((turned @ shared)**2, axis=(1, 2)) / np.trace(other[0])
 
 
 def _means(topic, interval_s):
-    """Means of the values over intervals from the first stamp on, bridged where there are none."""
-    place = ((topic.stamps_ns - topic.stamps_ns[0]) * (1e-9 / interval_s)).astype(np.int64)
+    """Means of the values about instants from the first stamp on, bridged where there are none."""
+    place = np.round((topic.stamps_ns - topic.stamps_ns[0]) * (1e-9 / interval_s)).astype(np.int64)
     count = np.bincount(place)
     here = np.flatnonzero(count)
     grid = np.arange(len(count))
-    return np.stack([np.interp(grid, here, np.bincount(place, topic.values[:, i])[here]
+    # of any unit: only shares of power are asked for
+    size = float(np.max(np.abs(topic.values)))
+    return np.stack([np.interp(grid, here, np.bincount(place, topic.values[:, i] / size)[here]
                                / count[here]) for i in range(3)], axis=1)
 
 
@@ -92,20 +208,16 @@ def _whitened(values):
     return values @ turn[:, moves] / np.sqrt(power[moves]) if power[-1] > 0 else None
 
 
-def _clear(common, peak, spectra, samples):
-    """Whether a peak is high, above chance, and alone."""
-    power = [np.sum(np.abs(x)**2, axis=1) for x in spectra]
-    both = power[0] * power[1]
-    independent = np.sum(both)**2 / max(np.sum(both**2), 1e-300)
-    # padding makes neighbouring frequencies alike
-    independent *= samples / 2 / len(both) / 2
-    if common[peak] < max(_COMMON, _CHANCE / independent):
-        return False
-    low = common < common[peak] / 2
+def _clear(explained, peak):
+    """Whether a peak is high, and alone."""
+    low = explained < explained[peak] / 2
     before, after = np.flatnonzero(low[:peak]), np.flatnonzero(low[peak:])
-    rest = np.r_[common[:before[-1]] if len(before) else [],
-                 common[peak + after[0]:] if len(after) else []]
-    return not len(rest) or rest.max() < _BESIDE * common[peak]
+    if explained[peak] < _EXPLAINED or not len(before) or not len(after):
+        return False
+    left, right = before[-1], peak + after[0]
+    beside = max(explained[:left].max(initial=0.0), explained[right:].max())
+    wide = len(explained) > _WIDTHS * (right - left)
+    return wide and beside < _BESIDE * explained[peak]
 
 
 def _vertex(three):
@@ -113,17 +225,3 @@ def _vertex(three):
     left, middle, right = three
     bend = left - 2 * middle + right
     return 0.5 * (left - right) / bend if bend < 0 else 0.0
-
-
-def _scatter(one, two, lag):
-    """Standard uncertainty of the lag, by blocks [intervals]."""
-    first, last = max(0, -lag) + 1, min(len(one), len(two) - lag) - 1
-    edges = np.linspace(first, last, _BLOCKS + 1).astype(int)
-    found = []
-    for start, stop in zip(edges[:-1], edges[1:]):
-        x = one[start:stop]
-        around = [float(np.sum((x.T @ two[start + lag + step:stop + lag + step])**2))
-                  for step in (-1, 0, 1)]
-        if stop - start > 4 and around[1] > 0:
-            found.append(np.clip(_vertex(around), -1, 1))
-    return np.std(found) / np.sqrt(len(found)) if len(found) > 1 else np.nan
