@@ -21,9 +21,14 @@ _SCATTERED = 0.2
 # Sampling intervals per sample over which a record may be spread.
 _SPREAD = 100
 _PARTS = 8
-# Robust scatter [intervals] from which on stamps are no uniform clock's: 0.37 where they fall
-# anywhere between the instants.
-_UNEVEN = 0.33
+# Stamps of which so many [%] are further from the instants than this [intervals] are no uniform
+# clock's: normal scatter of a third of an interval comes to 0.48.
+_MOST = 85
+_UNEVEN = 0.5
+# Robust scatter [intervals] of those that are not late, and their share, where stamps are a uniform
+# clock's with delays.
+_PUNCTUAL = 0.1
+_FEWEST_PUNCTUAL = 0.6
 # Steps that are short [mean steps], and their share where samples come in batches.
 _SHORT = 0.2
 _BATCHES = 0.3
@@ -73,9 +78,17 @@ class Clock:
         if found is not None:
             return found
         rate = long_term_rate(stamps_ns)
-        slot = slots_of(seconds * rate)
-        place = seconds * rate - slot
-        if _deviation(place) > _UNEVEN:
+        place = seconds * rate
+        # the first stamp may be the one that is off: the instants' phase is the mean one
+        phase = float(np.angle(np.mean(np.exp(2j * np.pi * place)))) / (2 * np.pi)
+        slot = slots_of(place - phase)
+        place = place - slot
+        if np.std(place) > _SCATTERED:
+            found = _delayed(seconds)
+            if found is not None:
+                return found
+        off = np.abs(place - np.median(place))
+        if np.percentile(off, _MOST) > _UNEVEN:
             steps = np.diff(merged(seconds))
             return cls("uneven", float(1 / np.percentile(steps, _LONG_STEP)), 0.0,
                        np.empty(0), 0.0)
@@ -204,13 +217,7 @@ def _batches(seconds):
         return None
     last = np.r_[np.flatnonzero(~short), len(steps)]
     place, stamps = last.astype(float), seconds[last]
-    kept = np.ones(len(last), bool)
-    for _ in range(_ROUNDS):
-        line = np.polyfit(place[kept], stamps[kept], 1)
-        late = stamps - np.polyval(line, place)
-        limit = _LATE * max(_deviation(late[kept]), 1e-3 * interval)
-        if np.array_equal(kept, kept := np.abs(late - np.median(late[kept])) < limit):
-            break
+    line, late, kept = _robust_line(place, stamps, interval)
     size = len(seconds) / len(last)
     if kept.sum() < _FIRST_PART // 8 or _deviation(late) > _SCATTER * size * line[0] \
             or np.mean(kept) < 0.5:
@@ -218,6 +225,28 @@ def _batches(seconds):
     least = float(np.percentile(late[kept], 5))
     return Clock("batches", float(1 / line[0]), float(line[1]) + least,
                  np.arange(len(seconds), dtype=float), float(np.std(late[kept])))
+
+
+def _delayed(seconds):
+    """Clock of stamps of which many are late, but no sample is lost; or None."""
+    interval, count = typical_interval(seconds), np.arange(len(seconds), dtype=float)
+    line, late, kept = _robust_line(count, seconds, interval)
+    if np.mean(kept) < _FEWEST_PUNCTUAL or _deviation(late[kept]) > _PUNCTUAL * line[0]:
+        return None
+    return Clock("regular", float(1 / line[0]), float(line[1] + np.median(late[kept])), count,
+                 float(np.std(late[kept])))
+
+
+def _robust_line(place, stamps, interval):
+    """Line through stamps without those that are late, the rest that it leaves, and who counts."""
+    kept = np.ones(len(place), bool)
+    for _ in range(_ROUNDS):
+        line = np.polyfit(place[kept], stamps[kept], 1)
+        late = stamps - np.polyval(line, place)
+        limit = _LATE * max(_deviation(late[kept]), 1e-3 * interval)
+        if np.array_equal(kept, kept := np.abs(late - np.median(late[kept])) < limit):
+            break
+    return line, late, kept
 
 
 def _deviation(values):

@@ -6,7 +6,6 @@ import numpy as np
 
 from ..errors import FracAccelError
 from . import resampling
-from .clock import slots_of
 
 FEWEST = 32
 # Drift of one topic's instants along the other's over the record that is none [samples], and how
@@ -50,7 +49,8 @@ def by_slots(one, two):
     interval, rate = 1e9 / one.clock.rate_hz, one.clock.rate_hz
     start = int(one.stamps_ns[0])
     places = [(topic.stamps_ns - start) / interval for topic in (one, two)]
-    slots = [slots_of(place) for place in places]
+    slots = [topic.clock.slot + np.round(np.median(place - topic.clock.slot))
+             for topic, place in zip((one, two), places)]
     # jitter averages out of the mean; a common clock offset between the two topics stays
     lag = interval * float(np.median(places[1] - slots[1]) - np.median(places[0] - slots[0]))
     first = int(max(slots[0][0], slots[1][0]))

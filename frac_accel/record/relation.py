@@ -17,6 +17,8 @@ _RESTS = 1e-4
 # Blocks of the record that uncertainties come from, and samples that one has at least.
 BLOCKS = 16
 _FEWEST = 8
+# Sizes of which products are still numbers, in any unit.
+_SMALLEST, _LARGEST = 1e-60, 1e60
 # Samples around the first guess of a lag that are tried, and their distance.
 _AROUND = 8
 _FINE = 0.125
@@ -165,7 +167,8 @@ def products(reference, sensor, valid, lags):
     """
     n = len(valid)
     first, last = max(0, -int(lags[0])), n - max(0, int(lags[-1]))
-    if last - first < BLOCKS * _FEWEST:
+    sizes = [float(np.max(np.abs(values))) for values in (reference, sensor)]
+    if last - first < BLOCKS * _FEWEST or not (min(sizes) > _SMALLEST and max(sizes) < _LARGEST):
         return None
     x, y = (np.where(valid[:, None], values - values[valid].mean(axis=0), 0.0)
             for values in (reference, sensor))

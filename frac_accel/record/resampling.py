@@ -21,8 +21,10 @@ _DEGREE = 5
 # Samples that are worked on at once, and half-width of what a spline depends on.
 _BLOCK = 1 << 16
 _MARGIN = 24
-# Distance [intervals of the rate that is asked for] up to which a missing sample shows.
+# Distance [intervals of the rate that is asked for] up to which a missing sample shows, and a gap
+# of half such an interval or more.
 _TOUCHED = 1.5
+_TOUCHED_LONG = 6.0
 # Samples in a row that a spline bridges; a longer gap is crossed by a straight line.
 _SPLINED = 2
 
@@ -78,13 +80,17 @@ def untouched(present, rate_hz, start_s, target_hz, target_start_s, count):
     """Whether each wanted instant is far enough from samples that are not present."""
     if present.all():
         return np.ones(count, bool)
-    lower = min(rate_hz, target_hz)
+    interval = rate_hz / min(rate_hz, target_hz)
     place = (target_start_s + np.arange(count) / target_hz - start_s) * rate_hz
-    width = _TOUCHED * rate_hz / lower
-    missing = np.r_[0, np.cumsum(~present)]
-    first, last = (np.clip(np.floor(place + side * width).astype(int) + (side > 0), 0,
-                           len(present)) for side in (-1, 1))
-    return missing[last] == missing[first]
+    edges = np.flatnonzero(np.diff(np.r_[True, present, True].astype(np.int8)))
+    starts, stops = edges[::2], edges[1::2]
+    free = np.ones(count, bool)
+    long = stops - starts > interval / 2
+    for which, intervals in ((~long, _TOUCHED), (long, _TOUCHED_LONG)):
+        gaps = starts[which] - intervals * interval, stops[which] - 1 + intervals * interval
+        # no more gaps begin before an instant than have ended
+        free &= np.searchsorted(gaps[0], place) == np.searchsorted(gaps[1], place)
+    return free
 
 
 def filled(slot, values):
