@@ -126,6 +126,7 @@ def test_phone_in_car():
     assert record.topics[0].clock.kind == "uneven"
     # 0.01 g: it is the car's values that are rounded to it
     assert record.step("reference", 0) == pytest.approx(0.0980665, rel=1e-6)
+    assert any("multiples of 0.0980665 (0.01 g)" in line for line in record.integrity(0).words)
     assert record.offset_s == pytest.approx(-0.2, abs=0.05)
     assert record.offset_std_s < 0.05
     assert any("before the reference" in words for words in record.words)

@@ -4,10 +4,14 @@ import re
 
 import numpy as np
 import pytest
+import rig
+from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
+from frac_accel import diagnose, identify
 from frac_accel.errors import FracAccelError
 from frac_accel.record import Record, Samples
+from frac_accel.validation import validate
 
 EPOCH_NS = 1_700_000_000_000_000_000
 
@@ -235,3 +239,48 @@ def test_absurd_stamps_are_one_line():
     one = Samples.of(stamps, rng.normal(size=(500, 3)))
     with pytest.raises(FracAccelError):
         Record.of(one, samples(np.arange(500) / 100, rng.normal(size=500)))
+
+
+def two_devices(seed, reference_hz, sensor_hz):
+    """A classical sensor with a delay, and the two topics, each sampled by its own device.
+
+    The band ends below the Nyquist frequency of either, and noise is 60 dB down.
+    """
+    rng = np.random.default_rng([20261122, seed])
+    fine = 1600.0
+    sensor = rig.draw_sensor(rng, fine, "classical", ["time_delay"],
+                             natural_frequency=(0.01, 0.02), damping_ratio=(0.2, 0.6))
+    excitation = rig.band_noise(rng, fine, 50.0, (0.5, 35.0), (1.0, 0.0, 0.0), lead_s=1.0)
+    record = rig.simulate_record(sensor, excitation, rng, snr_db=np.inf)
+    t = (record.stamps_ns - record.stamps_ns[0]) * 1e-9
+    topics = []
+    for rate, values, noise in ((reference_hz, record.reference, 0), (sensor_hz, record.clean, 1)):
+        at = np.arange(int(t[-1] * rate) - 1) / rate
+        found = CubicSpline(t, values)(at)
+        topics.append(samples(at, found + noise * 1e-3 * found[:, 0].std()
+                              * rng.normal(size=found.shape)))
+    return sensor, topics
+
+
+@pytest.mark.parametrize("rates", [(200.0, 200.1), (200.0, 199.0), (400.0, 100.0), (100.0, 400.0)])
+def test_a_sensor_is_identified_across_rates(rates):
+    sensor, topics = two_devices(1, *rates)
+    result = identify(Record.of(*topics), structure="oscillator")
+    for name in ("natural_frequency_hz", "damping_ratio", "sensitivity"):
+        assert result.parameters[name]["value"] == pytest.approx(sensor.core[name], rel=5e-3)
+    delay = result.parameters["delay_s"]["value"]
+    assert delay == pytest.approx(sensor.effects["time_delay"]["delay_s"], abs=3e-5)
+    found = validate(*topics, result.model)
+    assert found.simulation.total.nrmse < 0.01
+    assert found.comparison.corrected.total.nrmse < 0.03
+    assert found.comparison.corrected.total.band_hz[1] <= 0.4 * min(rates) + 1e-9
+
+
+@pytest.mark.long
+def test_rates_that_differ_a_little_become_neither_delay_nor_skew():
+    sensor, topics = two_devices(2, 200.0, 200.1)
+    found = diagnose(tuple(topics))
+    assert {finding.cause for finding in found.findings} <= {"time_delay"}
+    for finding in found.findings:
+        assert finding.effect.delay_s == pytest.approx(sensor.effects["time_delay"]["delay_s"],
+                                                       abs=3e-5)

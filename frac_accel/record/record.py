@@ -19,6 +19,11 @@ _FAR_PERIODS = 3.0
 # Lead of the sensor that is told: standard uncertainties, and seconds.
 _SIGNIFICANT = 4.0
 _LATE_S = 0.01
+# Steps of the reference [of its standard deviation] that are worth telling, and how near to a
+# number of two digits one is round.
+_COARSE = 0.01
+_ROUND = 1e-5
+_STANDARD_GRAVITY = 9.80665
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -110,6 +115,9 @@ class Record:
         """`Integrity` of an axis of the sensor."""
         found = self._topics[1].integrity(column, "sensor" not in self.resampled)
         found.words.extend(self.words)
+        step = self.step("reference", column)
+        if step and step > _COARSE * np.std(self.reference[:, column]):
+            found.words.append(f"the reference's values are multiples of {step:.6g}{_in_g(step)}")
         return found
 
     @classmethod
@@ -259,6 +267,12 @@ def _offset_words(offset, taken_out):
         return [f"the sensor shows the motion {size} before the reference does, which no sensor "
                 "can: the reference's stamps are late, or the sensor's early"]
     return []
+
+
+def _in_g(step):
+    """The same in g, where it is a round number there."""
+    g = step / _STANDARD_GRAVITY
+    return f" ({g:.2g} g)" if abs(g / float(f"{g:.2g}") - 1) < _ROUND else ""
 
 
 def _with_std(value, std):
