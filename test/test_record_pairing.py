@@ -231,6 +231,7 @@ def test_a_stamp_a_year_off_is_one_line(place, which):
         Record.of(*topics)
     assert "\n" not in str(caught.value)
     assert ("reference", "sensor")[which] in str(caught.value)
+    assert "the stamps jump by 3.15e+07 s" in str(caught.value)
 
 
 def test_absurd_stamps_are_one_line():

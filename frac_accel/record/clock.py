@@ -18,8 +18,9 @@ _FIRST_PART = 64
 # wrongly counted (0.29: as likely here as there).
 _REGULAR = 1e-3
 _SCATTERED = 0.2
-# Sampling intervals per sample over which a record may be spread.
-_SPREAD = 100
+# Sampling intervals per sample over which a record may be spread, and how many are never too many.
+_SPREAD = 10
+_ALWAYS = 10_000
 _PARTS = 8
 # Stamps of which so many [%] are further from the instants than this [intervals] are no uniform
 # clock's: normal scatter of a third of an interval comes to 0.48.
@@ -108,14 +109,15 @@ def require_span(stamps_ns, where):
         Saying between which samples the gap is.
     """
     span, interval = float(stamps_ns[-1]) - float(stamps_ns[0]), typical_interval(stamps_ns)
-    if span <= _SPREAD * len(stamps_ns) * interval:
+    if span / interval <= max(_SPREAD * len(stamps_ns), _ALWAYS):
         return
     steps = np.diff(stamps_ns.astype(float))
-    gap = int(np.argmax(steps))
+    longest = int(np.argmax(steps))
+    start = 1e-9 * (float(stamps_ns[longest]) - float(stamps_ns[0]))
     raise FracAccelError(
-        f"{where}: {len(stamps_ns)} samples are spread over {span / interval:.3g} sampling "
-        f"intervals, expected a record without such gaps: the stamp of usable sample {gap + 2} is "
-        f"{1e-9 * steps[gap]:.6g} s after the one before; is it right?")
+        f"{where}: {len(stamps_ns)} samples are spread over {span / interval:.6g} sampling "
+        f"intervals; {start:.6g} s after the start the stamps jump by {1e-9 * steps[longest]:.6g} "
+        "s: cut the record there, or leave out the samples whose stamps are wrong")
 
 
 def typical_interval(stamps):

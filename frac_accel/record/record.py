@@ -156,7 +156,7 @@ class Record:
         ------
         FracAccelError
             If a topic has too few samples, no signal on the axis, stamps that do not advance or
-            leave gaps a hundred times as long as all samples, or no time in common with the other;
+            leave gaps ten times as long as all samples, or no time in common with the other;
             or no temperature is finite.
         """
         column = AXES.index(axis)
