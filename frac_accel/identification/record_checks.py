@@ -82,7 +82,7 @@ def check_record(pair, axis="x"):
     missing = int(np.sum(~pair.valid))
     notes = [f"{missing} of {len(pair)} instants have no sample in one of the topics"] \
         if missing else []
-    notes += _collinear(pair)
+    notes += [*pair.words, *_collinear(pair)]
     moving, standing_notes = moving_samples(pair, column)
     valid, clipping_notes = _unclipped(reference, sensor, moving, pair, column)
     return RecordCheck(dataclasses.replace(pair, valid=valid), missing,

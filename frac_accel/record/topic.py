@@ -87,7 +87,8 @@ class Topic:
                                        for values in (samples.stamps_ns, samples.values))
         if len(self) < fewest:
             raise FracAccelError(f"{name}: {len(self)} usable sample(s), expected at least "
-                                 f"{fewest} whose stamps advance and whose values are finite")
+                                 f"{fewest} whose stamps advance and whose values are finite"
+                                 + _jump(samples.stamps_ns))
         require_span(self.stamps_ns, name)
         self._useless = np.empty(0, np.int64)
         self.duplicates = self.stamps_back = self.not_finite = 0
@@ -181,3 +182,12 @@ class Topic:
         if (what, column) not in self._found:
             self._found[what, column] = find()
         return self._found[what, column]
+
+
+def _jump(stamps_ns):
+    """Words for the stamp behind which all others go back, or none."""
+    steps = np.diff(stamps_ns.astype(float))
+    if not len(steps) or np.max(steps) <= 0 or steps.min() > -steps.max() / 2:
+        return ""
+    return (f": {1e-9 * (float(stamps_ns[int(np.argmax(steps))]) - float(stamps_ns[0])):.6g} s "
+            f"after the start the stamps jump by {1e-9 * steps.max():.6g} s, and go back then")
