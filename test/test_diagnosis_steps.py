@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from frac_accel.diagnosis.record import Record
 from rig.hidden import draw_case
 from scipy.optimize import minimize
 
@@ -12,6 +11,7 @@ import frac_accel
 from frac_accel.diagnosis.engine import Engine
 from frac_accel.diagnosis.problem import _step
 from frac_accel.effects import known_effects
+from frac_accel.record import Record
 from frac_accel.simulation import AxisSimulator
 
 
