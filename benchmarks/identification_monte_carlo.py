@@ -16,7 +16,7 @@ import scipy.signal
 import scipy.stats
 
 from frac_accel import identify
-from frac_accel.pair import Pair
+from frac_accel.record import Record
 
 RATE_HZ, DURATION_S = 2000.0, 5.0
 # kinds of sensors that each structure is identified from
@@ -43,7 +43,7 @@ def noisy_pair(rng, reference, clean, snr_db, noise_ar):
     noise = scipy.signal.lfilter([1.0], np.r_[1.0, -np.asarray(noise_ar)], noise)[1000:]
     sensor = clean.copy()
     sensor[:, 0] += noise / noise.std() * clean[:, 0].std() * 10**(-snr_db / 20)
-    return Pair(RATE_HZ, reference, sensor, np.ones(len(clean), bool), 0.0, 0, np.nan)
+    return Record(RATE_HZ, reference, sensor, np.ones(len(clean), bool), 0.0, 0, np.nan)
 
 
 def parameter_scores(result, sensor):

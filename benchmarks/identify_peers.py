@@ -9,7 +9,7 @@ import numpy as np
 from llsi.sysiddata import SysIdData
 
 from frac_accel import identify
-from frac_accel.pair import Pair
+from frac_accel.record import Record
 
 RATE_HZ, SAMPLES, SNR_DB = 2000.0, 10_000, 20.0
 NATURAL_HZ, DAMPING = 180.0, 0.15
@@ -56,7 +56,7 @@ def run():
     """Rows of the table."""
     reference, clean, sensor = records()
     empty = np.zeros((SAMPLES, 2))
-    pair = Pair(RATE_HZ, np.c_[reference, empty], np.c_[sensor, empty], np.ones(SAMPLES, bool),
+    pair = Record(RATE_HZ, np.c_[reference, empty], np.c_[sensor, empty], np.ones(SAMPLES, bool),
                 0.0, 0, np.nan)
     ours, result = seconds(lambda: identify(pair, structure="oscillator"), 7)
     theirs, model = seconds(lambda: llsi_output_error(reference, sensor), 1)

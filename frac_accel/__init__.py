@@ -18,6 +18,9 @@ _HOME = {
     "read_bag": "bag",
     "write_bag": "bag",
     "FracAccelError": "errors",
+    "Samples": "record.samples",
+    "Record": "record.record",
+    "Orientation": "record.orientation",
 }
 
 __all__ = sorted(_HOME)

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from frac_accel.errors import BagError
-from frac_accel.samples import Samples
+from frac_accel.record.samples import Samples
 
 IMU = "sensor_msgs/msg/Imu"
 ACCEL_STAMPED = "geometry_msgs/msg/AccelStamped"

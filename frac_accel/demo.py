@@ -21,8 +21,8 @@ from .correction import Corrector
 from .errors import FracAccelError
 from .identification import identify
 from .model import AXES, SensorModel
-from .pair import make_pair
 from .parameters import as_mapping
+from .record import Record
 from .report.identification import identification_page
 from .report.quantity import rounded
 from .validation import compare
@@ -153,7 +153,7 @@ def picture(results, path):
 def _identify(bag, measured, model_file, report):
     """Write the model of a bag's sensor and its report; what was found, as text."""
     source = provenance(bag, "python -m frac_accel.demo")
-    pair = make_pair(measured[REFERENCE_TOPIC], measured[RAW_TOPIC], AXIS)
+    pair = Record.of(measured[REFERENCE_TOPIC], measured[RAW_TOPIC], AXIS)
     result = identify(pair, AXIS, provenance=source)
     result.model.save(model_file)
     identification_page(result, pair, AXIS, source).write(report)

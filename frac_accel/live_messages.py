@@ -7,7 +7,7 @@ import numpy as np
 from . import cdr
 from .errors import BagError, FracAccelError
 from .live_simulation import LiveSimulator
-from .samples import Samples
+from .record.samples import Samples
 
 # What can no longer come out, because its sample was dropped, is forgotten when this many wait.
 _FORGET_AT = 1000

@@ -10,8 +10,7 @@ from .errors import FracAccelError
 from .identification.excitation import excited_band
 from .metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
 from .model import AXES
-from .pair import clean, make_pair
-from .samples import Samples
+from .record import Record, Samples
 from .simulation import simulate
 
 # A stamp that has been moved by a skew and back.
@@ -91,7 +90,7 @@ def validate(reference, sensor, model, axis="x", temperature_at=None, **wishes):
     FracAccelError
         If the pair cannot be compared.
     """
-    pair = make_pair(reference, sensor, axis)
+    pair = Record.of(reference, sensor, axis)
     corrector = Corrector(model, **wishes)
     parts = [*_corrected(corrector, sensor, temperature_at), corrector.finish()]
     stamps, values = (np.concatenate([getattr(part, name) for part in parts])
@@ -127,9 +126,9 @@ def compare(reference, sensor, corrected, design, axis="x"):
         If the records have too little in common.
     """
     column = AXES.index(axis)
-    pair = make_pair(reference, sensor, axis)
-    rate = pair.sampling_rate_hz
-    known = clean(reference)
+    pair = Record.of(reference, sensor, axis)
+    *known, known_rate = _known_reference(pair)
+    rate = pair.topics[1].clock.rate_hz if "sensor" in pair.resampled else pair.sampling_rate_hz
     # the raw sample of a corrected one still has the sensor's delay and skew in its stamp
     raw_stamps = corrected.stamps_ns + design.sensor_delay_ns
     since_start = raw_stamps - sensor.stamps_ns[0]
@@ -137,8 +136,9 @@ def compare(reference, sensor, corrected, design, axis="x"):
     raw_stamps = raw_stamps + np.round(skew * since_start).astype(np.int64)
     place = np.minimum(np.searchsorted(sensor.stamps_ns, raw_stamps - _ROUNDING_NS),
                        len(sensor.stamps_ns) - 1)
-    truth = interpolate(*known, corrected.stamps_ns, rate)[:, column]
-    truth_raw = interpolate(*known, raw_stamps, rate)[:, column]
+    ahead = round(1e9 * pair.taken_out_s)
+    truth = interpolate(*known, corrected.stamps_ns - ahead, known_rate)[:, column]
+    truth_raw = interpolate(*known, raw_stamps - ahead, known_rate)[:, column]
     run = _longest_run(np.isfinite(truth) & np.isfinite(truth_raw)
                        & (np.abs(sensor.stamps_ns[place] - raw_stamps) <= _ROUNDING_NS),
                        corrected.stamps_ns, rate)
@@ -146,7 +146,7 @@ def compare(reference, sensor, corrected, design, axis="x"):
     raw, after = sensor.values[place[run], column], corrected.values[run, column]
     low, high = excited_band(pair.reference[:, column], pair.sensor[:, column], rate)
     band = design.axes[column].band_hz
-    low, high = max(low, band[0]), min(high, band[1])
+    low, high = max(low, band[0]), min(high, band[1], pair.band_hz or np.inf)
     if low >= high:
         raise FracAccelError("the reference has no power in the band of the correction, "
                              f"{band[0]:.4g} Hz to {band[1]:.4g} Hz")
@@ -157,6 +157,15 @@ def compare(reference, sensor, corrected, design, axis="x"):
         scaled=error_metrics(truth_raw, scaled, rate, bands),
         corrected=error_metrics(truth, after, rate, bands),
         stamps_ns=stamps, reference=truth, before=scaled, after=after)
+
+
+def _known_reference(pair):
+    """Stamps and values of the reference, and their rate: as published, or as resampled."""
+    if "reference" not in pair.resampled:
+        topic = pair.topics[0]
+        return topic.stamps_ns, topic.values, topic.clock.rate_hz
+    grid = np.round(np.arange(len(pair)) * 1e9 / pair.sampling_rate_hz).astype(np.int64)
+    return pair.start_ns + grid, pair.reference, pair.sampling_rate_hz
 
 
 def _corrected(corrector, sensor, temperature_at):
@@ -175,8 +184,8 @@ def _simulated(model, pair, column, temperature_at):
     """Measured and simulated output at the same instants."""
     temperature = None
     if temperature_at is not None:
-        temperature = temperature_at(
-            pair.start_ns + np.arange(len(pair)) * 1e9 / pair.sampling_rate_hz)
+        seconds = pair.taken_out_s + np.arange(len(pair)) / pair.sampling_rate_hz
+        temperature = temperature_at(pair.start_ns + 1e9 * seconds)
     simulated = simulate(model, pair.reference, pair.sampling_rate_hz, initial="steady",
                          temperature_c=temperature)
     at = np.arange(len(pair)) / pair.sampling_rate_hz

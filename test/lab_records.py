@@ -4,8 +4,8 @@ import numpy as np
 import rig
 import scipy.signal
 
-from frac_accel.pair import make_pair
-from frac_accel.samples import Samples
+from frac_accel.record import Record
+from frac_accel.record.samples import Samples
 
 RATE_HZ = 2000.0
 X_ONLY = (1.0, 0.0, 0.0)
@@ -38,7 +38,7 @@ def noise(rng, n, pole=0.0):
 def pair_of(record, sensor=None, keep=slice(None), late_ns=0):
     """Pair of a rig's record, whose sensor's values may be others, holed or stamped later."""
     values = record.sensor if sensor is None else sensor
-    return make_pair(Samples.of(record.stamps_ns, record.reference),
+    return Record.of(Samples.of(record.stamps_ns, record.reference),
                      Samples.of(record.sensor_stamps_ns[keep] + late_ns, values[keep]))
 
 

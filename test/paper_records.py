@@ -7,7 +7,7 @@ import numpy as np
 import rig
 
 from frac_accel.bag import Samples
-from frac_accel.pair import make_pair
+from frac_accel.record import Record
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "bags"))
 
@@ -19,7 +19,7 @@ def pair_of(sensor, excitation, rng):
     record = rig.simulate_record(sensor, excitation, rng, snr_db=bench.SENSOR_NOISE_DB)
     topics = [Samples.of(record.stamps_ns, bench.STEP * np.round(values / bench.STEP))
               for values in (record.reference, record.sensor)]
-    return make_pair(*topics)
+    return Record.of(*topics)
 
 
 def noise_and_sines(sensor, rng):

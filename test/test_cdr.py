@@ -8,7 +8,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from frac_accel import cdr, message_definitions
 from frac_accel.errors import BagError
-from frac_accel.samples import Samples
+from frac_accel.record.samples import Samples
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 TYPES = STORE.types

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from frac_accel.diagnosis import integrity
-from frac_accel.diagnosis.record import Record
-from frac_accel.pair import slots_of
-from frac_accel.samples import Samples
+from frac_accel.record import Record, Topic
+from frac_accel.record.clock import slots_of
+from frac_accel.record.lattice import lattice_step
+from frac_accel.record.samples import Samples
 
 RATE = 1000.0
 
@@ -23,12 +23,12 @@ def test_step_of_rounded_values_is_found(seed):
     rng = np.random.default_rng(seed)
     step = float(np.exp(rng.uniform(-6, 1)))
     values = rng.normal(0, step * rng.uniform(3, 300), 8000) + rng.normal()
-    assert integrity.lattice(step * np.round(values / step)) == pytest.approx(step, rel=1e-6)
+    assert lattice_step(step * np.round(values / step)) == pytest.approx(step, rel=1e-6)
 
 
 def test_values_without_a_lattice_have_none():
     rng = np.random.default_rng(0)
-    assert integrity.lattice(rng.normal(size=8000)) is None
+    assert lattice_step(rng.normal(size=8000)) is None
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -36,7 +36,7 @@ def test_limits_are_found_where_samples_pile_up(seed):
     rng = np.random.default_rng(seed)
     values = rng.normal(size=4000)
     lower, upper = -rng.uniform(1, 2.5), rng.uniform(1, 2.5)
-    found = integrity.check(samples(np.clip(values, lower, upper)), RATE, 0)
+    found = Topic(samples(np.clip(values, lower, upper)), "sensor").integrity(0)
     assert (found.lower, found.upper) == (lower, upper)
 
 
@@ -46,7 +46,7 @@ def test_no_limits_where_nothing_is_clipped(step):
     for values in (rng.normal(size=20_000), np.sin(0.7 * np.arange(20_000)) + 1e-3 * rng.normal(
             size=20_000)):
         values = values if step is None else step * np.round(values / step)
-        found = integrity.check(samples(values), RATE, 0)
+        found = Topic(samples(values), "sensor").integrity(0)
         crest = step is not None and np.ptp(values) < 6 * step
         assert crest or (found.lower is None and found.upper is None)
 
@@ -58,7 +58,7 @@ def test_lost_samples_are_counted_and_stamps_that_scatter_measured(seed):
     kept = rng.random(10_000) > 0.01
     stamps = np.arange(10_000) / RATE + rng.normal(0, scatter_s, 10_000)
     kept[[0, -1]] = True
-    found = integrity.check(samples(rng.normal(size=kept.sum()), stamps[kept]), RATE, 0)
+    found = Topic(samples(rng.normal(size=kept.sum()), stamps[kept]), "sensor").integrity(0)
     assert found.missing == np.sum(~kept)
     assert found.jitter_rms_s == pytest.approx(scatter_s, rel=0.05)
 

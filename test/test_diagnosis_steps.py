@@ -10,8 +10,8 @@ from scipy.optimize import minimize
 import frac_accel
 from frac_accel.diagnosis.engine import Engine
 from frac_accel.diagnosis.problem import _step
-from frac_accel.diagnosis.record import Record
 from frac_accel.effects import known_effects
+from frac_accel.record import Record
 from frac_accel.simulation import AxisSimulator
 
 

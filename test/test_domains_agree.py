@@ -16,7 +16,7 @@ from frac_accel.identification.agreement import compare_domains
 from frac_accel.identification.frequency_domain import fit_response
 from frac_accel.identification.output_error import fit_output_error
 from frac_accel.identification.structures import FractionalStructure, OscillatorStructure
-from frac_accel.samples import Samples
+from frac_accel.record.samples import Samples
 
 PARAMETERS = ("sensitivity", "natural_frequency_hz", "damping_ratio", "delay_s")
 

@@ -11,8 +11,8 @@ from frac_accel import Corrector, SensorModel, identify
 from frac_accel.errors import IdentificationError
 from frac_accel.identification.arx import Orders, fit_arx, least_squares
 from frac_accel.identification.continuous_poles import continuous_poles
-from frac_accel.pair import make_pair
-from frac_accel.samples import Samples
+from frac_accel.record import Record
+from frac_accel.record.samples import Samples
 
 pytestmark = pytest.mark.long
 
@@ -31,7 +31,7 @@ def measured(rng, kind, snr_db=20.0, noise_ar=(), effects=(), duration_s=5.0, **
 
 
 def pair_of(record, keep=slice(None), late_ns=0):
-    return make_pair(Samples.of(record.stamps_ns, record.reference),
+    return Record.of(Samples.of(record.stamps_ns, record.reference),
                      Samples.of(record.sensor_stamps_ns[keep] + late_ns, record.sensor[keep]))
 
 

@@ -6,8 +6,8 @@ import rig
 
 from frac_accel import identify
 from frac_accel.identification.frequency_response import linear_share
-from frac_accel.pair import make_pair
-from frac_accel.samples import Samples
+from frac_accel.record import Record
+from frac_accel.record.samples import Samples
 
 RATE_HZ = 2000.0
 
@@ -16,7 +16,7 @@ def measured(rng, kind, snr_db, effects=("time_delay",), noise_ar=(), **draw):
     sensor = rig.draw_sensor(rng, RATE_HZ, kind, effects, **draw)
     excitation = rig.band_noise(rng, RATE_HZ, 4.0, (5.0, 700.0), (1.0, 0.0, 0.0), lead_s=1.0)
     record = rig.simulate_record(sensor, excitation, rng, snr_db=snr_db, noise_ar=noise_ar)
-    return make_pair(Samples.of(record.stamps_ns, record.reference),
+    return Record.of(Samples.of(record.stamps_ns, record.reference),
                      Samples.of(record.sensor_stamps_ns, record.sensor))
 
 

@@ -8,8 +8,8 @@ from frac_accel import identify
 from frac_accel.core import Oscillator
 from frac_accel.identification.output_error import fit_output_error
 from frac_accel.identification.structures import FractionalStructure
-from frac_accel.pair import make_pair
-from frac_accel.samples import Samples
+from frac_accel.record import Record
+from frac_accel.record.samples import Samples
 from frac_accel.uncertainty import response_uncertainty
 
 pytestmark = pytest.mark.long
@@ -21,7 +21,7 @@ def measured(rng, kind, snr_db, noise_ar=(), **draw):
     sensor = rig.draw_sensor(rng, RATE_HZ, kind, ["time_delay"], **draw)
     excitation = rig.band_noise(rng, RATE_HZ, 5.0, (5.0, 700.0), (1.0, 0.0, 0.0), lead_s=1.0)
     record = rig.simulate_record(sensor, excitation, rng, snr_db=snr_db, noise_ar=noise_ar)
-    return sensor.core, make_pair(Samples.of(record.stamps_ns, record.reference),
+    return sensor.core, Record.of(Samples.of(record.stamps_ns, record.reference),
                                   Samples.of(record.sensor_stamps_ns, record.sensor))
 
 
@@ -51,7 +51,7 @@ def test_response_is_known_where_its_parameters_are_not():
                 "damping_ratio": rng.uniform(0.5, 0.8), "damping_order": 1.0, "sensitivity": 1.0}
         excitation = rig.band_noise(rng, RATE_HZ, 3.0, (5.0, 400.0), (1.0, 0.0, 0.0), lead_s=0.2)
         record = rig.simulate_record(rig.Sensor(core, {}), excitation, rng, snr_db=20.0)
-        pair = make_pair(Samples.of(record.stamps_ns, record.reference),
+        pair = Record.of(Samples.of(record.stamps_ns, record.reference),
                          Samples.of(record.sensor_stamps_ns, record.sensor))
         result = identify(pair, structure="fractional")
         frequency = result.parameters["natural_frequency_hz"]

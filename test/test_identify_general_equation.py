@@ -15,8 +15,8 @@ from frac_accel.identification.structures import (
     OscillatorStructure,
     PlainTransferFunctionStructure,
 )
-from frac_accel.pair import make_pair
-from frac_accel.samples import Samples
+from frac_accel.record import Record
+from frac_accel.record.samples import Samples
 
 RATE_HZ = 2000.0
 S = 2j * np.pi * np.geomspace(10.0, 600.0, 40)
@@ -26,7 +26,7 @@ def measured(rng, kind, snr_db=40.0, noise_ar=()):
     sensor = rig.draw_sensor(rng, RATE_HZ, kind, ["time_delay", "offset"])
     excitation = rig.band_noise(rng, RATE_HZ, 5.0, (5.0, 700.0), (1.0, 0.0, 0.0), lead_s=1.0)
     record = rig.simulate_record(sensor, excitation, rng, snr_db=snr_db, noise_ar=noise_ar)
-    return sensor, make_pair(Samples.of(record.stamps_ns, record.reference),
+    return sensor, Record.of(Samples.of(record.stamps_ns, record.reference),
                              Samples.of(record.sensor_stamps_ns, record.sensor))
 
 

@@ -12,8 +12,8 @@ from frac_accel.bag import write_bag
 from frac_accel.cli import main
 from frac_accel.errors import IdentificationError
 from frac_accel.identification.records import agreement, combine
-from frac_accel.pair import make_pair
-from frac_accel.samples import Samples
+from frac_accel.record import Record
+from frac_accel.record.samples import Samples
 
 pytestmark = pytest.mark.long
 
@@ -34,7 +34,7 @@ def record_of(rng, sensor, band_hz=(5.0, 700.0), snr_db=25.0, **noise):
 
 
 def pairs_of(rng, *sensors, **options):
-    return [make_pair(*record_of(rng, sensor, **options)) for sensor in sensors]
+    return [Record.of(*record_of(rng, sensor, **options)) for sensor in sensors]
 
 
 def truth(sensor):
@@ -101,7 +101,7 @@ def test_an_incomplete_model_is_not_blamed_on_the_mounting_alone():
     rng = np.random.default_rng(20334)
     sensor = rig.draw_sensor(rng, RATE_HZ, "classical", ["time_delay", "mounting_resonance"],
                              natural_frequency=(0.1, 0.2), damping_ratio=(0.2, 0.7))
-    pairs = [make_pair(*record_of(rng, sensor, band, snr_db=50.0))
+    pairs = [Record.of(*record_of(rng, sensor, band, snr_db=50.0))
              for band in ((5.0, 300.0), (5.0, 700.0))]
     result = identify(pairs, structure="oscillator")
     assert not result.validation.records.complete

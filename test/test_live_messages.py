@@ -10,7 +10,7 @@ from frac_accel.correction import Corrector
 from frac_accel.errors import BagError
 from frac_accel.live_messages import BlockMessages, NoisySensor, SampleMessages
 from frac_accel.model import SensorModel
-from frac_accel.samples import Samples
+from frac_accel.record.samples import Samples
 
 MODELS = Path(__file__).parents[1] / "config" / "models"
 RATE_HZ = 1000.0

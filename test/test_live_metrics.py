@@ -11,7 +11,7 @@ from frac_accel.live_metrics import (
     clipped_share,
     evaluate,
 )
-from frac_accel.samples import Samples
+from frac_accel.record.samples import Samples
 
 RATE_HZ = 1000.0
 START_NS = 1_700_000_000 * 10**9

@@ -10,7 +10,6 @@ import rig
 
 from frac_accel import SensorModel
 from frac_accel.errors import BagError, IdentificationError
-from frac_accel.pair import load_pair
 from frac_accel.paper.study.answer import answer
 from frac_accel.paper.study.bench import SENSORS, bags_of, judge_sensor, refusal
 from frac_accel.paper.study.candidates import (
@@ -27,6 +26,7 @@ from frac_accel.paper.study.judge import Sines, judge
 from frac_accel.paper.study.map import DOES_NOT, HELPS, OPEN, SEEMS, Cell
 from frac_accel.paper.study.sweep import best
 from frac_accel.paper.study.virtual import Case, Outcome, outcome
+from frac_accel.record import Record
 
 BAGS = Path(__file__).resolve().parents[1] / "bags"
 FEW_ORDERS = ([(0.94, 2.0), (1.0, 2.0), (1.06, 2.0), (2.0, 2.0)], [(1.0, 2.0), (1.04, 1.96)])
@@ -103,7 +103,7 @@ def test_missing_bags_are_named(tmp_path):
 
 def test_other_records_are_no_judges():
     with pytest.raises(IdentificationError, match="expected a stepped sine"):
-        Sines.of(load_pair(bags_of(BAGS)["classical"][0]))
+        Sines.of(Record.load(bags_of(BAGS)["classical"][0]))
 
 
 def test_bags_are_small_and_hold_the_bench(bench):

@@ -11,7 +11,7 @@ import pytest
 from frac_accel import SensorModel, identify
 from frac_accel.cli import main
 from frac_accel.errors import ModelError
-from frac_accel.pair import load_pair
+from frac_accel.record import Record
 from frac_accel.report.identification import identification_page
 from frac_accel.report.quantity import percent, rounded
 from frac_accel.uncertainty import response_uncertainty
@@ -92,7 +92,7 @@ def test_page_without_interval_says_why(tmp_path, monkeypatch):
         raise ModelError("covariance: the data have not determined the parameters")
 
     monkeypatch.setattr("frac_accel.report.identification.response_uncertainty", refuse)
-    pair = load_pair(BAG, axis="y")
+    pair = Record.load(BAG, axis="y")
     result = identify(pair, axis="y", structure="oscillator")
     identification_page(result, pair, "y", {}).write(tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text()

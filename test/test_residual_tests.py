@@ -11,8 +11,8 @@ from frac_accel.identification.fit_validation import judge_residual
 from frac_accel.identification.output_error import fit_output_error
 from frac_accel.identification.residual_tests import residual_tests
 from frac_accel.identification.structures import OscillatorStructure
-from frac_accel.pair import make_pair
-from frac_accel.samples import Samples
+from frac_accel.record import Record
+from frac_accel.record.samples import Samples
 
 pytestmark = pytest.mark.long
 
@@ -28,7 +28,7 @@ def record_of(rng, effects=(), duration_s=1.5, band_hz=(5.0, 700.0), rng_noise=N
 
 
 def pair_of(record):
-    return make_pair(Samples.of(record.stamps_ns, record.reference),
+    return Record.of(Samples.of(record.stamps_ns, record.reference),
                      Samples.of(record.sensor_stamps_ns, record.sensor))
 
 

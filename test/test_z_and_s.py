@@ -11,8 +11,8 @@ from frac_accel import Corrector, identify, simulate
 from frac_accel.core import Arx
 from frac_accel.identification.continuous_poles import METHOD
 from frac_accel.model import SensorModel
-from frac_accel.pair import make_pair
-from frac_accel.samples import Samples
+from frac_accel.record import Record
+from frac_accel.record.samples import Samples
 
 RATE_HZ = 2000.0
 
@@ -56,7 +56,7 @@ def test_poles_in_s_come_with_their_method():
     """Each oscillating pair of the saved model, mapped by hand from its denominator."""
     _, record = drawn(np.random.default_rng(60263), (5.0, 700.0), 40.0,
                       natural_frequency=(0.05, 0.1), damping_ratio=(0.05, 0.3))
-    pair = make_pair(Samples.of(record.stamps_ns, record.reference),
+    pair = Record.of(Samples.of(record.stamps_ns, record.reference),
                      Samples.of(record.sensor_stamps_ns, record.sensor))
     result = identify(pair, structure="arx")
     equivalent = result.model.metadata["continuous_equivalent"]

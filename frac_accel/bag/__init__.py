@@ -16,7 +16,7 @@ from frac_accel.bag.reader import BagReader, Block, Message, TopicInfo
 from frac_accel.bag.writer import BagWriter
 from frac_accel.cdr import Temperatures
 from frac_accel.errors import BagError
-from frac_accel.samples import Samples
+from frac_accel.record.samples import Samples
 
 __all__ = [
     "REFERENCE_TOPIC",

@@ -20,7 +20,7 @@ from frac_accel.bag.files import bag_files
 from frac_accel.bag.mcap_file import McapFile, Messages, Segment
 from frac_accel.bag.qos import Qos, parse_qos
 from frac_accel.errors import BagError
-from frac_accel.samples import Samples
+from frac_accel.record.samples import Samples
 
 MAX_OPEN_BYTES = 512 * 2**20
 """Most bytes of chunks that overlap in time and so have to be held together."""

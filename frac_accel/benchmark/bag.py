@@ -15,7 +15,7 @@ from mcap.writer import Writer
 from .. import cdr
 from ..bag import RAW_TOPIC, BagWriter
 from ..errors import FracAccelError
-from ..samples import Samples
+from ..record.samples import Samples
 from . import machine
 from .figures import Figure
 from .live import _ROOT, model_document

@@ -7,7 +7,7 @@ from .. import cdr
 from ..correction import Corrector
 from ..live_messages import SampleMessages
 from ..model import SensorModel
-from ..samples import Samples
+from ..record.samples import Samples
 from .figures import Figure
 from .live import model_document
 from .uncertainty import shortest_us

@@ -13,6 +13,7 @@ from tqdm import tqdm
 from ..bag import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC, BagReader
 from ..errors import BagError, FracAccelError
 from ..parameters import plain
+from ..record import Temperature
 from ..report import require_plotly
 
 
@@ -45,7 +46,7 @@ def add_temperature(parser):
 
 
 def read_temperature_at(reader, topic):
-    """Function that gives the temperature [°C] at stamps [ns], interpolated, held at the ends.
+    """`Temperature` of a topic: a function of stamps [ns] that gives °C.
 
     Raises
     ------
@@ -53,14 +54,13 @@ def read_temperature_at(reader, topic):
         If the bag has no such topic, or nothing usable on it.
     """
     blocks = list(reader.temperatures(topic))
-    stamps, celsius = (np.concatenate([np.empty(0), *(getattr(block, name) for block in blocks)])
-                       for name in ("stamps_ns", "celsius"))
-    usable = np.isfinite(celsius)
-    if not usable.any():
-        raise BagError(f"{reader.path}: topic {topic} has no usable temperature")
-    order = np.argsort(stamps[usable], kind="stable")
-    stamps, celsius = stamps[usable][order], celsius[usable][order]
-    return lambda stamps_ns: np.interp(stamps_ns, stamps, celsius)
+    stamps, celsius = (np.concatenate([np.empty(0, dtype), *(getattr(block, name)
+                                                             for block in blocks)])
+                       for name, dtype in (("stamps_ns", np.int64), ("celsius", float)))
+    try:
+        return Temperature(stamps, celsius)
+    except FracAccelError:
+        raise BagError(f"{reader.path}: topic {topic} has no usable temperature") from None
 
 
 def add_filter(parser):

@@ -7,7 +7,7 @@ mean, and whether they agree is said.
 from pathlib import Path
 
 from ..identification import STRUCTURES, identify
-from ..pair import load_pair
+from ..record import Record
 from ..report.identification import identification_page
 from ._common import (
     add_json,
@@ -42,7 +42,8 @@ def run(arguments):
     require_report(arguments.report, *bags)
     for bag in bags:
         open_bag(bag)
-    pairs = [load_pair(bag, arguments.reference, arguments.sensor, arguments.axis) for bag in bags]
+    pairs = [Record.load(bag, arguments.reference, arguments.sensor, arguments.axis)
+             for bag in bags]
     command = (f"frac_accel identify {' '.join(bags)} --structure {arguments.structure} "
                f"--reference {arguments.reference} --sensor {arguments.sensor} "
                f"--axis {arguments.axis}")

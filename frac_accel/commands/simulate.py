@@ -8,7 +8,7 @@ import numpy as np
 
 from ..bag import BagWriter, cdr
 from ..model import SensorModel
-from ..pair import uniform
+from ..record.record import UniformSamples
 from ..simulation import simulate
 from ._common import (
     add_bag,
@@ -45,7 +45,7 @@ def run(arguments):
     info = reader.topic(arguments.reference, cdr.ACCELERATION_TYPES)
     samples = [block for _, block in reader.samples([arguments.reference])]
     samples = cdr.Samples.concatenate(samples) if samples else None
-    record = uniform(samples, f"{arguments.bag}: topic {arguments.reference}")
+    record = UniformSamples.of(samples, f"{arguments.bag}: topic {arguments.reference}")
     grid_ns = samples.stamps_ns[record.index[0]] + (
         np.arange(len(record.values)) * 1e9 / record.sampling_rate_hz)
     simulated = simulate(

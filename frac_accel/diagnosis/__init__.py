@@ -1,5 +1,6 @@
 """What a simulation gets wrong, which cause explains it, and what the extended model gains."""
 
+import dataclasses
 import functools
 from pathlib import Path
 
@@ -12,13 +13,12 @@ from ..errors import FracAccelError, IdentificationError
 from ..identification.excitation import learning_length, require_excitation
 from ..identification.record_checks import moving_samples
 from ..model import AXES, SensorModel
-from ..pair import Pair
+from ..record import Record
+from ..record.orientation import turned_away
 from ..simulation import AxisSimulator
-from . import integrity
 from .engine import Engine
 from .judgement import Diagnosis, EstablishedNoise, Finding, insufficient, judge
 from .leftover import related
-from .record import Record
 from .spikes import spikes
 from .time_limit import TimeLimit
 
@@ -75,11 +75,11 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     column = AXES.index(axis)
     progress("checking the data")
     record = Record.of(*source, axis, temperature)
-    found = integrity.check(source[1], record.sampling_rate_hz, column)
+    found = record.integrity(column)
     if len(record) < _FEWEST:
         return insufficient(f"the record has {len(record)} samples, expected at least {_FEWEST}",
                             model, found)
-    moving, notes = moving_samples(record.reference[:, column], record.sensor[:, column], record)
+    moving, notes = moving_samples(record, column)
     found.words.extend(notes)
     shown = _shown(found, record.sensor[:, column])
     used = record.valid & moving
@@ -144,9 +144,7 @@ def _classical(record, axis, used):
     """Classical core identified from the record, what it knows of it (nothing, since any cause has
     bent it), and the effects that it was identified with."""
     from ..identification import identify
-    pair = Pair(record.sampling_rate_hz, record.reference, record.sensor, used, record.lag_s,
-                record.start_ns, float("nan"))
-    model = identify(pair, axis, "oscillator").model
+    model = identify(dataclasses.replace(record, valid=used), axis, "oscillator").model
     return (SensorModel(model.core), dict.fromkeys(_CORE, np.inf),
             {effect.cause: effect for effect in model.effects})
 
@@ -178,15 +176,9 @@ def _require_relation(engine, axis, seed):
     follows, share = related(p.measured, start, p.used)
     if follows:
         return
-    hint = ""
-    for other in range(3):
-        if other != p.axis and np.ptp(p.record.reference[:, other]):
-            simulated = p.simulator(other).simulate(p.baseline.axis(other))
-            elsewhere, more = related(p.measured, simulated, p.used)
-            if elsewhere and more > 2 * share:
-                hint = f"; it follows the reference's {AXES[other]}: the axes are exchanged"
+    hint = turned_away(p.record, axis) or "they do not belong together"
     raise FracAccelError(f"axis {axis}: the sensor does not follow the reference (they share "
-                         f"{max(share, 0):.2%} of the power); they do not belong together{hint}")
+                         f"{max(share, 0):.2%} of the power); {hint}")
 
 
 def _require_direction(engine, axis, start):

@@ -10,7 +10,6 @@ from scipy.signal import resample_poly
 
 from ..effects import known_effects
 from ..model import AXES, AxisModel, SensorModel, is_link
-from ..pair import clean
 from ..parameters import parameter_fields
 from .experiments import separating_experiment
 from .gain import gain
@@ -189,7 +188,7 @@ class Seen:
 
     def at_stamps(self):
         """Instants with a sample, and the simulated output at the stamps that these carry."""
-        stamps, _ = clean(self.sensor)
+        stamps = self.record.topics[1].stamps_ns
         rate = self.record.sampling_rate_hz
         place = (stamps - self.record.start_ns) * 1e-9 * rate
         slot = np.round(place).astype(int)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FracAccelError, IdentificationError
-from ..pair import load_pair
+from ..record import Record
 from .candidate import STRUCTURES as _STRUCTURES
 from .candidate import Candidate, Data
 from .choice import choose, choose_of_several
@@ -28,7 +28,7 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None, r
 
     Parameters
     ----------
-    pair : Pair, str or Path, or a list of them
+    pair : Record, str or Path, or a list of them
         A measured pair, or a bag with one on the default topics. Of several, each gets a model
         that is judged on all others, and the result is their mean.
     axis : {"x", "y", "z"}
@@ -66,7 +66,7 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None, r
     records = records or [Path(pair).name if isinstance(pair, (str, Path)) else f"record {i + 1}"
                           for i, pair in enumerate(pairs)]
     progress = progress or (lambda words: None)
-    datas = [Data.of(load_pair(pair, axis=axis) if isinstance(pair, (str, Path)) else pair, axis,
+    datas = [Data.of(Record.load(pair, axis=axis) if isinstance(pair, (str, Path)) else pair, axis,
                      progress) for pair in pairs]
     agreeing = None
     if len(datas) > 1:

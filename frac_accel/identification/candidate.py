@@ -8,7 +8,8 @@ import numpy as np
 from ..errors import FracAccelError, IdentificationError
 from ..metrics import octave_bands
 from ..model import AXES
-from ..pair import Pair
+from ..record import Record
+from ..record.orientation import turned_away
 from .arx import FEWEST_COEFFICIENTS, ArxFit, ArxStructure, fit_arx
 from .direction import exchanged_instead, judge_direction
 from .excitation import learning_length, persistent_excitation, require_order
@@ -43,7 +44,7 @@ class Data:
     """
 
     record: RecordCheck
-    pair: Pair
+    pair: Record
     reference: np.ndarray
     sensor: np.ndarray
     spread: float
@@ -51,6 +52,7 @@ class Data:
     progress: Callable
     order: int
     lines_hz: list
+    axis: str = "x"
 
     @classmethod
     def of(cls, pair, axis, progress):
@@ -66,7 +68,7 @@ class Data:
         progress("measuring the frequency response")
         return cls(record, pair, pair.reference[:, column].copy(), sensor.copy(),
                    float(np.std(sensor[pair.valid])), MeasuredResponse.of(pair, axis), progress,
-                   *excited)
+                   *excited, axis)
 
     def fit(self, structure, part=slice(None), start=None, uncertainty=True, held=None):
         """Fit of a structure to a part of the record; options as in `fit_output_error`."""
@@ -177,7 +179,7 @@ def fit_of(structure, data, start=None):
         return data.fit(structure, start=start)
     except IdentificationError as error:
         record = data.reference, data.sensor, data.pair
-        raise exchanged_instead(*record) or far_apart(*record) or error from None
+        raise exchanged_instead(*record) or far_apart(*record) or _astray(data) or error from None
 
 
 def suspicions(fit, data):
@@ -189,12 +191,20 @@ def suspicions(fit, data):
         If no sensor can be behind it.
     """
     record = data.reference, data.sensor, data.pair
-    apart = far_apart(*record) if fit.rmse > _POOR * data.spread else None
-    if apart is not None:
-        raise apart
+    if fit.rmse > _POOR * data.spread:
+        apart = far_apart(*record) or _astray(data)
+        if apart is not None:
+            raise apart
     require_time_to_answer(fit, data.pair)
     data.progress("judging the direction from reference to sensor")
     return judge_direction(fit, *record)
+
+
+def _astray(data):
+    """Error of an axis that follows another one of the reference, or None."""
+    words = turned_away(data.pair, data.axis)
+    return IdentificationError(f"axis {data.axis}: the sensor does not follow the reference; "
+                               f"{words}") if words else None
 
 
 def _held_out(structure, fit, data):

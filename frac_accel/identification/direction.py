@@ -95,7 +95,7 @@ def exchanged_instead(reference, sensor, pair):
     Parameters
     ----------
     reference, sensor : ndarray, shape (n,)
-    pair : Pair
+    pair : Record
 
     Returns
     -------
@@ -113,7 +113,7 @@ def judge_direction(fit, reference, sensor, pair):
         Of any structure; only if it lacks something or answers too early are the directions
         compared.
     reference, sensor : ndarray, shape (n,)
-    pair : Pair
+    pair : Record
 
     Returns
     -------

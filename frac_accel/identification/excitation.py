@@ -77,8 +77,10 @@ class Excitation:
         levels = np.sqrt(energies[counts > 0] / counts[counts > 0]).tolist()
         rms = float(np.sqrt(energies.sum() / counts.sum()))
         peak = float(np.max(np.abs(motion)))
-        return cls(recognised.kind, recognised.words, order, needed,
-                   excited_band(reference, sensor, pair.sampling_rate_hz), rms, peak, peak / rms,
+        low, high = excited_band(reference, sensor, pair.sampling_rate_hz)
+        # above it nothing can be compared
+        band = (low, min(high, pair.band_hz)) if pair.band_hz else (low, high)
+        return cls(recognised.kind, recognised.words, order, needed, band, rms, peak, peak / rms,
                    min(levels), max(levels), pair.sensor_std, len(pair), record.missing,
                    record.clipped, record.standing)
 

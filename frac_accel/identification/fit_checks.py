@@ -28,7 +28,7 @@ def require_time_to_answer(fit, pair):
     Parameters
     ----------
     fit : Fit
-    pair : Pair
+    pair : Record
 
     Raises
     ------
@@ -49,7 +49,7 @@ def far_apart(reference, sensor, pair):
     Parameters
     ----------
     reference, sensor : ndarray, shape (n,)
-    pair : Pair
+    pair : Record
 
     Returns
     -------

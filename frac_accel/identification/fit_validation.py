@@ -107,7 +107,7 @@ def judge_residual(core, fit, reference, pair):
         That of the fit.
     fit : Fit
     reference : ndarray, shape (n,)
-    pair : Pair
+    pair : Record
     """
     used = np.isfinite(fit.residual)
     if fit.gradient is None:

@@ -72,7 +72,7 @@ def response_points(pair, axis="x"):
 
     Parameters
     ----------
-    pair : Pair
+    pair : Record
     axis : {"x", "y", "z"}
 
     Returns

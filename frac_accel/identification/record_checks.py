@@ -6,8 +6,8 @@ import numpy as np
 
 from ..errors import IdentificationError
 from ..model import AXES
-from ..pair import Pair
-from .clipping import clipped_reference, clipped_sensor, lattice_step
+from ..record import Record
+from .clipped import clipped_reference, clipped_sensor
 from .frequency_response import bulk_delay
 
 # Difference between two copies of one signal, of its peak: the rounding of 32-bit numbers.
@@ -43,7 +43,7 @@ class RecordCheck:
 
     Attributes
     ----------
-    pair : Pair
+    pair : Record
         The pair with those samples marked as not valid.
     missing, clipped, standing : int
         Instants without a sample, with a clipped one, and at which one of the topics stood still
@@ -51,7 +51,7 @@ class RecordCheck:
     notes : list of str
     """
 
-    pair: Pair
+    pair: Record
     missing: int
     clipped: int
     standing: int
@@ -63,7 +63,7 @@ def check_record(pair, axis="x"):
 
     Parameters
     ----------
-    pair : Pair
+    pair : Record
     axis : {"x", "y", "z"}
 
     Returns
@@ -78,13 +78,13 @@ def check_record(pair, axis="x"):
     """
     column = AXES.index(axis)
     reference, sensor = pair.reference[:, column], pair.sensor[:, column]
-    _require_no_copy(reference, sensor, pair.valid)
+    _require_no_copy(reference, sensor, pair.valid, pair.step("sensor", column))
     missing = int(np.sum(~pair.valid))
     notes = [f"{missing} of {len(pair)} instants have no sample in one of the topics"] \
         if missing else []
-    notes += _collinear(pair)
-    moving, standing_notes = moving_samples(reference, sensor, pair)
-    valid, clipping_notes = _unclipped(reference, sensor, moving, pair)
+    notes += [*pair.words, *_collinear(pair)]
+    moving, standing_notes = moving_samples(pair, column)
+    valid, clipping_notes = _unclipped(reference, sensor, moving, pair, column)
     return RecordCheck(dataclasses.replace(pair, valid=valid), missing,
                        int(np.sum(moving & ~valid)), int(np.sum(pair.valid & ~moving)),
                        notes + standing_notes + clipping_notes)
@@ -109,7 +109,7 @@ def require_magnitude(pair, axis="x"):
                 f"{_LARGEST:g}: no unit of acceleration makes them so; is the topic corrupt?")
 
 
-def _require_no_copy(reference, sensor, valid):
+def _require_no_copy(reference, sensor, valid, lattice):
     delay = bulk_delay(reference, sensor)
     n = len(sensor) - abs(delay)
     first, second = (slice(start, start + n) for start in (max(-delay, 0), max(delay, 0)))
@@ -121,7 +121,7 @@ def _require_no_copy(reference, sensor, valid):
     largest, spread = np.max(np.abs(middle - factor * x)), np.std(y)
     if largest > _FINE * spread:
         return
-    step = max(lattice_step(y), _decimal_step(y, _FINE * spread))
+    step = max(lattice or 0.0, _decimal_step(y, _FINE * spread))
     if largest <= max(_SAME * np.max(np.abs(y)), _ROUNDING * step * (step < _FINE * spread)):
         later = f", {delay} sample(s) later" if delay else ""
         raise IdentificationError(
@@ -169,12 +169,14 @@ def _excited(values):
     return np.flatnonzero(spread > 1e-6 * spread.max())
 
 
-def moving_samples(reference, sensor, pair):
+def moving_samples(pair, column):
     """Valid instants without those at which one topic stands still while the other moves."""
+    reference, sensor = pair.reference[:, column], pair.sensor[:, column]
+    steps = [pair.step(name, column) or 0.0 for name in ("reference", "sensor")]
     moving, notes = pair.valid.copy(), []
-    sensor_runs = _standstills(sensor, reference, pair.valid)
-    reference_runs = [run for run in _standstills(reference, sensor, pair.valid)
-                      if _off_its_rest(reference, run, pair.valid)]
+    sensor_runs = _standstills(sensor, reference, pair.valid, steps[1])
+    reference_runs = [run for run in _standstills(reference, sensor, pair.valid, steps[0])
+                      if _off_its_rest(reference, run, pair.valid, steps[0])]
     for name, other, values, runs in (("sensor", "reference", sensor, sensor_runs),
                                       ("reference", "sensor", reference, reference_runs)):
         if not runs:
@@ -193,7 +195,7 @@ def moving_samples(reference, sensor, pair):
     return moving, notes
 
 
-def _standstills(values, other, valid):
+def _standstills(values, other, valid, step):
     """Where values stand still while the other topic moves: list of (start, stop)."""
     places = np.flatnonzero(valid)
     changes = np.flatnonzero(np.diff(values[places]) != 0) + 1
@@ -202,7 +204,6 @@ def _standstills(values, other, valid):
     if not len(long):
         return []
     usual = np.std(other[places])
-    step = lattice_step(values[places])
     extremes = values[places].min(), values[places].max()
     runs = [(int(places[edges[i]]), int(places[edges[i + 1] - 1]) + 1) for i in long]
     runs = [run for run in runs if (motion := _motion(other[slice(*run)])) > _MOVING * usual
@@ -226,19 +227,19 @@ def _gain_beside(values, other, start, stop):
     return np.std(values[window]) / motion if motion > 0 else 0.0
 
 
-def _off_its_rest(values, run, valid):
+def _off_its_rest(values, run, valid, step):
     """Whether values jump to a standstill or from it, or stand apart from their median."""
     start, stop = run
     before, after = np.flatnonzero(valid[:start]), stop + np.flatnonzero(valid[stop:])
     steps = [abs(values[start] - np.median(values[valid])),
              *(abs(values[start] - values[place]) for place in (*before[-1:], *after[:1]))]
-    return max(steps) > max(_JUMP * np.std(values[valid]), _STEPS * lattice_step(values[valid]))
+    return max(steps) > max(_JUMP * np.std(values[valid]), _STEPS * step)
 
 
-def _unclipped(reference, sensor, valid, pair):
+def _unclipped(reference, sensor, valid, pair, column):
     """Valid instants without the clipped ones."""
     notes = []
-    found = clipped_reference(reference, sensor, valid)
+    found = clipped_reference(reference, sensor, valid, pair.step("reference", column))
     count = int(found.samples.sum())
     if count:
         words = f"the reference is clipped at {found.words} in {count} of {len(pair)} samples"
@@ -247,7 +248,8 @@ def _unclipped(reference, sensor, valid, pair):
                                       "excite less or use a reference with a larger range")
         notes.append(f"{words}, which do not count")
         valid = valid & ~found.samples
-    found = clipped_sensor(reference, sensor, valid, pair.sampling_rate_hz, pair.lag_s)
+    found = clipped_sensor(reference, sensor, valid, pair.step("sensor", column),
+                           pair.sampling_rate_hz, pair.lag_s)
     count = int(found.samples.sum())
     if count:
         words = f"the sensor is clipped at {found.words} in {count} of {len(pair)} samples"

@@ -19,7 +19,7 @@ from sensor_msgs.msg import Imu, PointCloud2
 
 from .. import cdr
 from ..benchmark.live import START_NS
-from ..samples import Samples
+from ..record.samples import Samples
 from ._runtime import RawSubscription
 
 DEPTH = 20_000

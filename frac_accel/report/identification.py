@@ -24,7 +24,7 @@ def identification_page(result, pair, axis="x", provenance=None):
     Parameters
     ----------
     result : Identification
-    pair : Pair
+    pair : Record
         What the model was identified from.
     axis : {"x", "y", "z"}
     provenance : dict, optional

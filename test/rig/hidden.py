@@ -80,7 +80,7 @@ class HiddenCase:
 
     def samples(self):
         """Reference and sensor as `Samples`, and stamps and °C of the temperature or None."""
-        from frac_accel.samples import Samples
+        from frac_accel.record.samples import Samples
 
         record = self.record
         temperature = None

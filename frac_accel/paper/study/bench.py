@@ -8,7 +8,7 @@ import numpy as np
 from ...diagnosis import diagnose
 from ...errors import BagError, IdentificationError
 from ...identification import identify
-from ...pair import load_pair
+from ...record import Record
 from .. import published
 from ..tables import errors_percent
 from .candidates import fit_all
@@ -110,7 +110,7 @@ def judge_sensor(name, paths, progress=lambda: None, orders=None):
     """
     if orders is None:
         orders = (damping_orders(), table_4()) if name in SWEPT else ([], [])
-    pair, sines = load_pair(paths[0]), Sines.of(load_pair(paths[1]))
+    pair, sines = Record.load(paths[0]), Sines.of(Record.load(paths[1]))
     fits = fit_all(pair.reference[:, 0], pair.sensor[:, 0], pair.sampling_rate_hz, pair.valid,
                    pair.lag_s)
     found = identify(pair)

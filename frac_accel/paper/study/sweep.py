@@ -57,7 +57,7 @@ def sweep(pairs_of_orders, pair, sines, progress=lambda: None):
     Parameters
     ----------
     pairs_of_orders : sequence of (float, float)
-    pair : Pair
+    pair : Record
         To identify from.
     sines : Sines
         To judge on.

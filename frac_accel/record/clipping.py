@@ -1,0 +1,121 @@
+"""Samples that a converter or an amplifier has clipped.
+
+Samples pile up at an extreme in other ways too (a sensor at rest, the crests of a coarsely
+quantised sine, a long dwell). A pile that is large enough is certain by itself (`certain`); of a
+smaller one a model of the other samples decides (`clipped`).
+"""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import IdentificationError
+
+# Samples at the extreme, at least, and how many more than at any of the next distinct values make
+# a pile, and one that is certain where values repeat. The crests of a quantised sine come to 2.4
+# times the next level.
+_FEWEST = 5
+_PILE_UP = 1.5
+_CERTAIN = 4
+_NEXT_VALUES = 2
+# What stands at one value for a larger share of the record rests there.
+_RESTING = 0.4
+# How far beyond the limit the model goes in the middle of the clipped samples: steps of the
+# lattice (half a step is rounding), standard deviations of what it leaves of the others, and of
+# the channel (a slightly nonlinear sensor stays below the model at its crests).
+_BEYOND_STEPS = 0.55
+_BEYOND_NOISE = 0.5
+_BEYOND = 0.05
+
+
+class Pile(NamedTuple):
+    """Samples at the greatest value, their number, and the largest of the next values' numbers."""
+
+    limit: float
+    count: int
+    next_count: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Clipping:
+    """What is clipped of one channel.
+
+    Attributes
+    ----------
+    samples : ndarray of bool, shape (n,)
+    limits : tuple of float
+        Values at which the samples stand, the lower one first.
+    """
+
+    samples: np.ndarray
+    limits: tuple
+
+    @property
+    def words(self):
+        """Where the limits are."""
+        return " and ".join(f"{limit:.6g}" for limit in self.limits)
+
+
+def pile_up(values):
+    """`Pile` at the greatest value if suspiciously many samples have it, else None."""
+    top = values.max()
+    count = int(np.count_nonzero(values == top))
+    if count < _FEWEST or count >= _RESTING * len(values):
+        return None
+    # few samples say what the next values are, as a rule
+    below, next_count, level = values[values < top], 0, top
+    for _ in range(_NEXT_VALUES):
+        if not len(below):
+            return None
+        level = below.max()
+        next_count = max(next_count, int(np.count_nonzero(below == level)))
+        below = below[below < level]
+    return Pile(float(top), count, next_count) if count >= _PILE_UP * next_count else None
+
+
+def certain(pile, step):
+    """Limit of a pile that no model need confirm, or None.
+
+    On a lattice (of that step, if any) the tail falls from level to level.
+    """
+    if pile is None or (step and pile.count <= _CERTAIN * pile.next_count):
+        return None
+    return pile.limit
+
+
+def clipped(values, valid, step, model):
+    """Piled-up samples beyond whose limit a model of the others goes.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    valid : ndarray of bool, shape (n,)
+    step : float or None
+        Of the values' lattice.
+    model : callable
+        Gives the expected values, shape (n,), from a mask of the samples that it may learn from;
+        raises IdentificationError where these do not tell.
+
+    Returns
+    -------
+    Clipping
+    """
+    piles = {side: pile_up(side * values[valid]) for side in (-1, 1)}
+    suspect = {side: valid & (values == side * pile.limit) for side, pile in piles.items() if pile}
+    none = np.zeros(len(values), bool)
+    if not suspect:
+        return Clipping(none, ())
+    others = valid & ~np.any(list(suspect.values()), axis=0)
+    try:
+        expected = model(others)
+    except IdentificationError:
+        # what the other samples cannot tell stays unknown; the fit of all of them will say why
+        return Clipping(none, ())
+    least = max(_BEYOND_STEPS * (step or 0.0),
+                _BEYOND_NOISE * np.std((values - expected)[others]),
+                _BEYOND * np.std(values[valid]))
+    found = {side: samples for side, samples in suspect.items()
+             if np.median(side * (expected - values)[samples]) > least}
+    return Clipping(np.any([none, *found.values()], axis=0),
+                    tuple(float(values[samples][0]) for samples in found.values()))

@@ -1,0 +1,256 @@
+"""The clock behind stamps: rate, whole instants, and how far the stamps scatter about it."""
+
+import dataclasses
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from ..correction.timing import estimate_rate
+from ..errors import FracAccelError
+
+# Scatter of the stamps [intervals] with which rounding still finds the instants, and the share of
+# samples that may have more.
+_SCATTER = 0.3
+_RARE = 1e-3
+_NEIGHBOURS = 15
+_FIRST_PART = 64
+# Scatter [intervals] of stamps that are as regular as clocks make them, and of those that look
+# wrongly counted (0.29: as likely here as there).
+_REGULAR = 1e-3
+_SCATTERED = 0.2
+# Sampling intervals per sample over which a record may be spread, and how many are never too many.
+_SPREAD = 10
+_ALWAYS = 10_000
+_PARTS = 8
+# Stamps of which so many [%] are further from the instants than this [intervals] are no uniform
+# clock's: normal scatter of a third of an interval comes to 0.48.
+_MOST = 85
+_UNEVEN = 0.5
+# Robust scatter [intervals] of those that are not late, and their share, where stamps are a uniform
+# clock's with delays.
+_PUNCTUAL = 0.1
+_FEWEST_PUNCTUAL = 0.6
+# Steps that are short [mean steps], and their share where samples come in batches.
+_SHORT = 0.2
+_BATCHES = 0.3
+# Rejections of late stamps from a clock line, and what counts as late [robust deviations].
+_ROUNDS = 8
+_LATE = 3.0
+# Percentile of the steps between uneven stamps that sets the rate that they can show.
+_LONG_STEP = 95
+# What a robust deviation is multiplied by to be a standard deviation of normal scatter.
+_NORMAL = 1.4826
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Clock:
+    """A line through stamps.
+
+    Attributes
+    ----------
+    kind : {"regular", "batches", "uneven"}
+        Uniform instants that the stamps scatter about; uniform instants whose samples come several
+        at a time; none, so that only the stamps say when a sample was taken.
+    rate_hz : float
+        Of the instants; of uneven stamps, the rate that 95 % of the steps can show.
+    start_s : float
+        Instant of slot 0 after the first stamp [s].
+    slot : ndarray, shape (n,)
+        Whole instants, ascending; empty where there are none.
+    scatter_s : float
+        Standard deviation of the stamps about the line [s]; 0 of uneven ones.
+    """
+
+    kind: str
+    rate_hz: float
+    start_s: float
+    slot: np.ndarray
+    scatter_s: float
+
+    @classmethod
+    def of(cls, stamps_ns):
+        """Clock of at least three ascending stamps [ns] without a span that `require_span` refuses.
+
+        Samples in batches carry the stamps of their arrival: the last one of each, which waited
+        least, says when it was taken.
+        """
+        seconds = (stamps_ns - stamps_ns[0]) * 1e-9
+        found = _batches(seconds)
+        if found is not None:
+            return found
+        rate = long_term_rate(stamps_ns)
+        place = seconds * rate
+        # the first stamp may be the one that is off: the instants' phase is the mean one
+        phase = float(np.angle(np.mean(np.exp(2j * np.pi * place)))) / (2 * np.pi)
+        slot = slots_of(place - phase)
+        place = place - slot
+        if np.std(place) > _SCATTERED:
+            found = _delayed(seconds)
+            if found is not None:
+                return found
+        off = np.abs(place - np.median(place))
+        if np.percentile(off, _MOST) > _UNEVEN:
+            steps = np.diff(merged(seconds))
+            return cls("uneven", float(1 / np.percentile(steps, _LONG_STEP)), 0.0,
+                       np.empty(0), 0.0)
+        slope, start = np.polyfit(slot, seconds, 1)
+        scatter = float(np.std(seconds - (slope * slot + start)))
+        return cls("regular", rate, float(np.median(place)) / rate, slot, scatter)
+
+
+def require_span(stamps_ns, where):
+    """Refuse stamps between which there are far more instants than samples.
+
+    A record is laid out on its instants; one stamp a year ahead would ask for all the memory.
+
+    Raises
+    ------
+    FracAccelError
+        Saying between which samples the gap is.
+    """
+    span, interval = float(stamps_ns[-1]) - float(stamps_ns[0]), typical_interval(stamps_ns)
+    if span / interval <= max(_SPREAD * len(stamps_ns), _ALWAYS):
+        return
+    steps = np.diff(stamps_ns.astype(float))
+    longest = int(np.argmax(steps))
+    start = 1e-9 * (float(stamps_ns[longest]) - float(stamps_ns[0]))
+    raise FracAccelError(
+        f"{where}: {len(stamps_ns)} samples are spread over {span / interval:.6g} sampling "
+        f"intervals; {start:.6g} s after the start the stamps jump by {1e-9 * steps[longest]:.6g} "
+        "s: cut the record there, or leave out the samples whose stamps are wrong")
+
+
+def typical_interval(stamps):
+    """Mean step in a part of the record without long gaps, in the stamps' unit: a median of parts.
+
+    It holds where samples come in batches, and most steps are too short.
+    """
+    edges = np.unique(np.linspace(0, len(stamps) - 1, _PARTS + 1).astype(int))
+    return float(np.median(np.diff(stamps[edges].astype(float)) / np.diff(edges)))
+
+
+def usable(samples):
+    """Mask of the samples whose stamps advance and whose values are finite."""
+    stamps = samples.stamps_ns
+    good = np.isfinite(samples.values).all(axis=1)
+    good[1:] &= stamps[1:] > np.maximum.accumulate(stamps)[:-1]
+    return good
+
+
+def merged(seconds, *columns):
+    """Ascending stamps without such that are almost the same, and columns with them: means."""
+    steps = np.diff(seconds)
+    first = np.r_[0, np.flatnonzero(steps >= _SHORT * typical_interval(seconds)) + 1]
+    if len(first) == len(seconds):
+        return (seconds, *columns) if columns else seconds
+    count = np.diff(np.r_[first, len(seconds)])
+    means = [np.add.reduceat(values, first, axis=0) / count.reshape(-1, *[1] * (values.ndim - 1))
+             for values in (seconds, *columns)]
+    return means if columns else means[0]
+
+
+def slots_of(place):
+    """Whole instants that samples belong to.
+
+    Parameters
+    ----------
+    place : ndarray, shape (n,)
+        Stamps in sampling intervals, ascending.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Whole numbers. Where stamps scatter so much that rounding would put two samples on one
+        instant, what is lost between the samples is counted by the median of neighbours.
+    """
+    nearest = np.round(place)
+    scatter = place - nearest
+    scatter = scatter - np.median(scatter)
+    if np.mean(np.abs(scatter) > _SCATTER) < _RARE:
+        return nearest
+    count = np.arange(len(place))
+    ahead = median_filter(place - count, _NEIGHBOURS, mode="nearest")
+    lost = np.round(ahead - ahead[0]) + np.round(ahead[0])
+    return count + np.maximum.accumulate(lost)
+
+
+def long_term_rate(stamps):
+    """Rate over the whole record [Hz], by lines fitted to ever longer parts of it.
+
+    Each line says to which instants the stamps [ns] of the next part belong, however they scatter.
+    """
+    interval = 1e9 / estimate_rate(stamps)
+    seconds = (stamps - stamps[0]).astype(float)
+    first = seconds[:_FIRST_PART] / interval
+    # interval by interval, since the estimate's error adds up; where one stamp is so late that its
+    # interval looks like two, the places themselves; or no sample is lost
+    counted = np.cumsum(np.r_[0, np.maximum(np.round(np.diff(first)), 1)])
+    found = []
+    for slots in (counted, slots_of(first), np.arange(len(first))):
+        line = _grown(seconds, slots)
+        place = (seconds - line[1]) / line[0]
+        found.append((np.std(place - np.round(place)), line[0], place))
+        if found[-1][0] < _SCATTERED:
+            break
+    scatter, interval, place = min(found, key=lambda entry: entry[0])
+    if scatter < _REGULAR:
+        # the ends say it to the last digit
+        return 1e9 * (np.round(place[-1]) - np.round(place[0])) / float(stamps[-1] - stamps[0])
+    return 1e9 / interval
+
+
+def _grown(seconds, slots):
+    """Line through the first stamps, over ever more of them."""
+    length = len(slots)
+    line = np.polyfit(slots, seconds[:length], 1)
+    while length < len(seconds):
+        length = min(2 * length, len(seconds))
+        place = (seconds[:length] - line[1]) / line[0]
+        line = np.polyfit(np.round(place), seconds[:length], 1)
+    return line
+
+
+def _batches(seconds):
+    """Clock of samples that come several at a time and none of which is lost, or None."""
+    steps = np.diff(seconds)
+    interval = typical_interval(seconds)
+    short = steps < _SHORT * interval
+    if np.mean(short) < _BATCHES:
+        return None
+    last = np.r_[np.flatnonzero(~short), len(steps)]
+    place, stamps = last.astype(float), seconds[last]
+    line, late, kept = _robust_line(place, stamps, interval)
+    size = len(seconds) / len(last)
+    if kept.sum() < _FIRST_PART // 8 or _deviation(late) > _SCATTER * size * line[0] \
+            or np.mean(kept) < 0.5:
+        return None
+    least = float(np.percentile(late[kept], 5))
+    return Clock("batches", float(1 / line[0]), float(line[1]) + least,
+                 np.arange(len(seconds), dtype=float), float(np.std(late[kept])))
+
+
+def _delayed(seconds):
+    """Clock of stamps of which many are late, but no sample is lost; or None."""
+    interval, count = typical_interval(seconds), np.arange(len(seconds), dtype=float)
+    line, late, kept = _robust_line(count, seconds, interval)
+    if np.mean(kept) < _FEWEST_PUNCTUAL or _deviation(late[kept]) > _PUNCTUAL * line[0]:
+        return None
+    return Clock("regular", float(1 / line[0]), float(line[1] + np.median(late[kept])), count,
+                 float(np.std(late[kept])))
+
+
+def _robust_line(place, stamps, interval):
+    """Line through stamps without those that are late, the rest that it leaves, and who counts."""
+    kept = np.ones(len(place), bool)
+    for _ in range(_ROUNDS):
+        line = np.polyfit(place[kept], stamps[kept], 1)
+        late = stamps - np.polyval(line, place)
+        limit = _LATE * max(_deviation(late[kept]), 1e-3 * interval)
+        if np.array_equal(kept, kept := np.abs(late - np.median(late[kept])) < limit):
+            break
+    return line, late, kept
+
+
+def _deviation(values):
+    """Standard deviation by the median of the deviations from the median."""
+    return float(_NORMAL * np.median(np.abs(values - np.median(values))))

@@ -1,0 +1,301 @@
+"""A reference and a sensor on the same uniform instants: what everything else begins with."""
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from ..errors import FracAccelError
+from ..model import AXES
+from .clock import usable
+from .pairing import FEWEST, by_slots, by_stamps, same_clock
+from .relation import clock_offset, refined
+from .temperature import Temperature
+from .topic import Topic
+
+# Offset of the clocks [s], and in periods of the motion, from which on it is no sensor's delay.
+_FAR_S = 1.0
+_FAR_PERIODS = 3.0
+# Lead of the sensor that is told: standard uncertainties, and seconds.
+_SIGNIFICANT = 4.0
+_LATE_S = 0.01
+# Steps of the reference [of its standard deviation] that are worth telling, and how near to a
+# number of two digits one is round.
+_COARSE = 0.01
+_ROUND = 1e-5
+_STANDARD_GRAVITY = 9.80665
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Record:
+    """Reference and sensor on uniform instants.
+
+    Attributes
+    ----------
+    sampling_rate_hz : float
+    reference : ndarray, shape (n, 3)
+        Acceleration [m/s²]; bridged where a sample is missing.
+    sensor : ndarray, shape (n, 3)
+        Output in the sensor's units.
+    valid : ndarray of bool, shape (n,)
+        False where either of the two is missing.
+    lag_s : float
+        Time [s] by which the sensor's instants are later than the reference's; within half a
+        sampling interval, and 0 where one of them has been resampled.
+    start_ns : int
+        Stamp of the first instant.
+    sensor_std : float
+        Standard deviation that the messages themselves state for the sensor's noise; NaN without.
+    temperature_c : ndarray, shape (n,), or None
+        Temperature [°C] at the instants.
+    band_hz : float or None
+        Highest frequency up to which the two may be compared, where one of them (`resampled`) was
+        put on the other's instants; None where no value was changed.
+    resampled : tuple of str
+        Which of "reference" and "sensor" have been.
+    offset_s, offset_std_s : float or None
+        By how much the sensor's stamps are later for the same motion, as far as the correlation
+        shows it clearly. Below zero, the reference's are later: that is no sensor's doing.
+    taken_out_s : float
+        The part of it that has been taken out of the sensor's stamps: 0, or `offset_s` where the
+        clocks are so far apart that no sensor's delay can be behind it.
+    words : tuple of str
+        What was done to put them together.
+    topics : tuple of Topic, or None
+        The usable samples of reference and sensor, with what can be said of each.
+    since_start_s : float
+        Time [s] from the start of the whole record, of which this may be a part.
+    """
+
+    sampling_rate_hz: float
+    reference: np.ndarray
+    sensor: np.ndarray
+    valid: np.ndarray
+    lag_s: float = 0.0
+    start_ns: int = 0
+    sensor_std: float = np.nan
+    temperature_c: np.ndarray | None = None
+    band_hz: float | None = None
+    resampled: tuple = ()
+    offset_s: float | None = None
+    offset_std_s: float | None = None
+    taken_out_s: float = 0.0
+    words: tuple = ()
+    topics: tuple | None = None
+    since_start_s: float = 0.0
+
+    def __len__(self):
+        return len(self.valid)
+
+    def __repr__(self):
+        band = f", up to {self.band_hz:.4g} Hz" if self.band_hz else ""
+        return (f"Record({len(self)} samples at {self.sampling_rate_hz:.6g} Hz, "
+                f"{len(self) / self.sampling_rate_hz:.4g} s{band})")
+
+    def part(self, rows):
+        """The record's samples of a slice with a start."""
+        celsius = None if self.temperature_c is None else self.temperature_c[rows]
+        return dataclasses.replace(
+            self, reference=self.reference[rows], sensor=self.sensor[rows], valid=self.valid[rows],
+            temperature_c=celsius,
+            start_ns=self.start_ns + int(rows.start * 1e9 / self.sampling_rate_hz),
+            since_start_s=self.since_start_s + rows.start / self.sampling_rate_hz)
+
+    @functools.cached_property
+    def _topics(self):
+        """The topics, or what the record's own arrays give for them."""
+        if self.topics is not None:
+            return self.topics
+        from .samples import Samples
+        stamps = np.round(np.flatnonzero(self.valid) * 1e9 / self.sampling_rate_hz)
+        return tuple(Topic(Samples.of(stamps, values[self.valid]), name, fewest=3) for name, values
+                     in (("reference", self.reference), ("sensor", self.sensor)))
+
+    def step(self, name, column):
+        """Lattice step of an axis of "reference" or "sensor" as published, or None."""
+        return self._topics[name == "sensor"].step(column)
+
+    def integrity(self, column):
+        """`Integrity` of an axis of the sensor."""
+        found = self._topics[1].integrity(column, "sensor" not in self.resampled)
+        found.words.extend(self.words)
+        step = self.step("reference", column)
+        if step and step > _COARSE * np.std(self.reference[:, column]):
+            found.words.append(f"the reference's values are multiples of {step:.6g}{_in_g(step)}")
+        return found
+
+    @classmethod
+    def load(cls, bag, reference=None, sensor=None, axis="x"):
+        """Record of two topics of a bag (default: the usual ones); errors as `of` and `read_bag`.
+        """
+        from ..bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
+        names = [reference or REFERENCE_TOPIC, sensor or RAW_TOPIC]
+        topics = read_bag(bag, names)
+        try:
+            return cls.of(*(topics[name] for name in names), axis)
+        except FracAccelError as error:
+            raise type(error)(f"{bag}: {error}") from None
+
+    @classmethod
+    def of(cls, reference, sensor, axis="x", temperature=None):
+        """Put two runs of samples on the same uniform instants.
+
+        With one rate, sample belongs to sample, and the scatter of the stamps averages out. Where
+        rates or clocks differ, the stamps say when each sample was taken: the slower topic keeps
+        its instants and sets the band, and the other is resampled to them.
+
+        Parameters
+        ----------
+        reference, sensor : Samples
+        axis : {"x", "y", "z"}
+            The axis that must hold a signal.
+        temperature : Temperature or (stamps_ns, celsius), optional
+
+        Returns
+        -------
+        Record
+            It ends with the last instant at which both have a sample.
+
+        Raises
+        ------
+        FracAccelError
+            If a topic has too few samples, no signal on the axis, stamps that do not advance or
+            leave gaps ten times as long as all samples, or no time in common with the other;
+            or no temperature is finite.
+        """
+        column = AXES.index(axis)
+        one, two = Topic(reference, "reference"), Topic(sensor, "sensor")
+        for topic in (one, two):
+            _require_signal(topic, column)
+        offset = clock_offset(one, two, int(one.stamps_ns[0]))
+        taken_out, words = 0.0, []
+        if offset is not None and _far(offset, one, two):
+            taken_out = offset.seconds
+            two.shift(-taken_out)
+        paired = by_slots(one, two) if same_clock(one, two) else by_stamps(one, two)
+        stated = sensor.variance[:, column]
+        std = np.sqrt(np.nanmean(stated)) if np.isfinite(stated).any() else np.nan
+        last = int(np.flatnonzero(paired.valid)[-1]) + 1 if paired.valid.any() else 0
+        if np.count_nonzero(paired.valid) < FEWEST // 2:
+            raise FracAccelError(f"reference and sensor have {np.count_nonzero(paired.valid)} "
+                                 f"instants in common, expected at least {FEWEST}")
+        lag = paired.lag_s
+        if offset is not None:
+            rest = refined(paired.reference, paired.sensor, paired.valid, paired.sampling_rate_hz,
+                           offset.seconds - taken_out - lag, paired.band_hz)
+            if rest is not None:
+                offset = dataclasses.replace(rest, seconds=rest.seconds + lag + taken_out)
+                if taken_out:
+                    taken_out, lag = offset.seconds, -rest.seconds
+            words += _offset_words(offset, taken_out)
+        celsius = None
+        if temperature is not None:
+            instants = np.round(np.arange(last) * 1e9 / paired.sampling_rate_hz).astype(np.int64)
+            celsius = Temperature.of(temperature)(
+                paired.start_ns + round(taken_out * 1e9) + instants)
+        return cls(paired.sampling_rate_hz, paired.reference[:last], paired.sensor[:last],
+                   paired.valid[:last], lag, paired.start_ns, float(std), celsius,
+                   paired.band_hz, paired.resampled, offset and offset.seconds,
+                   offset and offset.std_s, taken_out, (*words, *paired.words), (one, two))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class UniformSamples:
+    """Samples of one topic on uniform instants.
+
+    Attributes
+    ----------
+    sampling_rate_hz : float
+    values : ndarray, shape (n, 3)
+        Bridged linearly where a sample is missing.
+    index : ndarray of int, shape (m,)
+        Samples that are usable.
+    slot : ndarray of int, shape (m,)
+        Their places among the uniform instants.
+    """
+
+    sampling_rate_hz: float
+    values: np.ndarray
+    index: np.ndarray
+    slot: np.ndarray
+
+    @property
+    def bridged(self):
+        """Number of instants without a sample."""
+        return len(self.values) - len(self.slot)
+
+    @classmethod
+    def of(cls, samples, where):
+        """Put one run of samples (or None) on uniform instants; `where` is its name in messages.
+
+        Raises
+        ------
+        FracAccelError
+            If fewer than two samples are usable, or they are spread too far.
+        """
+        from .clock import long_term_rate
+        count = int(usable(samples).sum()) if samples is not None else 0
+        if count < 2:
+            raise FracAccelError(f"{where}: {count} usable sample(s), expected at least 2 whose "
+                                 "stamps advance and whose values are finite")
+        topic = Topic(samples, where, fewest=2)
+        stamps, values = topic.stamps_ns, topic.values
+        index = np.arange(count) if topic.index is None else topic.index
+        rate = long_term_rate(stamps)
+        slot = np.round((stamps - stamps[0]) * rate * 1e-9).astype(np.int64)
+        # stamps that scatter so much that two samples share an instant: the first one counts
+        first = np.r_[True, np.diff(slot) > 0]
+        index, slot, values = index[first], slot[first], values[first]
+        grid = np.arange(slot[-1] + 1)
+        bridged = np.stack([np.interp(grid, slot, values[:, i]) for i in range(3)], axis=1)
+        return cls(rate, bridged, index, slot)
+
+
+def _require_signal(topic, column):
+    spread = np.ptp(topic.values, axis=0)
+    if spread[column] == 0:
+        others = [AXES[i] for i in np.flatnonzero(spread)]
+        hint = f"; there is signal on {' and '.join(others)}" if others else ""
+        raise FracAccelError(f"{topic.name}: axis {AXES[column]} is constant at "
+                             f"{topic.values[0, column]:g}{hint}")
+
+
+def _offset_words(offset, taken_out):
+    """What is to be said of the clocks: nothing where a sensor's own delay may be behind it."""
+    size = _with_std(abs(offset.seconds), offset.std_s) + " s"
+    if taken_out:
+        later = "ahead of" if offset.seconds > 0 else "behind"
+        return [f"the sensor's clock is {size} {later} the reference's, by what both measure: this "
+                "is taken out of its stamps, and no delay of the sensor can be told"]
+    if offset.seconds < -max(_SIGNIFICANT * offset.std_s, _LATE_S):
+        return [f"the sensor shows the motion {size} before the reference does, which no sensor "
+                "can: the reference's stamps are late, or the sensor's early"]
+    return []
+
+
+def _in_g(step):
+    """The same in g, where it is a round number there."""
+    g = step / _STANDARD_GRAVITY
+    return f" ({g:.2g} g)" if abs(g / float(f"{g:.2g}") - 1) < _ROUND else ""
+
+
+def _with_std(value, std):
+    """Value and standard uncertainty with as many digits as that leaves."""
+    digits = max(0, int(np.ceil(-np.log10(max(std, 1e-9)))))
+    return f"{value:.{digits}f} +- {std:.1g}"
+
+
+def _far(offset, one, two):
+    """Whether clocks are so far apart that no delay of a sensor is behind it."""
+    start = max(one.stamps_ns[0], two.stamps_ns[0])
+    stop = min(one.stamps_ns[-1], two.stamps_ns[-1])
+    if stop - start < FEWEST * 1e9 / min(one.clock.rate_hz, two.clock.rate_hz):
+        return True
+    moving = one.values[:, int(np.argmax(np.std(one.values, axis=0)))]
+    moving = moving - moving.mean()
+    # mean period by the crossings of the mean
+    crossings = max(int(np.count_nonzero(np.diff(np.signbit(moving)))), 1)
+    period = 2 * float(one.stamps_ns[-1] - one.stamps_ns[0]) * 1e-9 / crossings
+    return abs(offset.seconds) > max(_FAR_S, _FAR_PERIODS * period)
+
+

@@ -1,0 +1,144 @@
+"""Values at other instants: band-limited, without aliases, whatever the ratio of the rates."""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import map_coordinates
+from scipy.signal import firwin, oaconvolve, resample_poly
+
+from .clock import merged
+
+# Highest frequency that is kept, and lowest that is gone, of the rate that is asked for: what lies
+# between is folded to above the band. Attenuation [dB] and Kaiser's shape for it.
+BAND = 0.4
+_GONE = 0.6
+_ATTENUATION_DB = 80.0
+_KAISER = 0.1102 * (_ATTENUATION_DB - 8.7)
+# Half-width of the filter [intervals of the rate that is asked for].
+REACH = int(np.ceil((_ATTENUATION_DB - 7.95) / (2.285 * 2 * np.pi * (_GONE - BAND)) / 2))
+# Oversampling at which a spline of degree 5 is wrong by 1e-4 at the band's edge.
+_OVERSAMPLED = 2.2
+_DEGREE = 5
+# Samples that are worked on at once, and half-width of what a spline depends on.
+_BLOCK = 1 << 16
+_MARGIN = 24
+# Distance [intervals of the rate that is asked for] up to which a missing sample shows, and a gap
+# of half such an interval or more.
+_TOUCHED = 1.5
+_TOUCHED_LONG = 6.0
+# Samples in a row that a spline bridges; a longer gap is crossed by a straight line.
+_SPLINED = 2
+
+
+def band_limited(values, rate_hz, start_s, target_hz, target_start_s, count):
+    """Uniform samples at other uniform instants.
+
+    A low-pass filter of linear phase without delay (Kaiser's window method: A. V. Oppenheim,
+    R. W. Schafer, *Discrete-Time Signal Processing*, 3rd ed., section 7.6) and a spline of degree 5
+    through its oversampled output.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, 3)
+    rate_hz, start_s : float
+        Rate and instant of the first sample.
+    target_hz, target_start_s : float
+        Wanted ones; the band kept is `BAND` of the lower rate.
+    count : int
+
+    Returns
+    -------
+    ndarray, shape (count, 3)
+        Meaningless closer than `REACH` intervals of the lower rate to the ends of `values`.
+    """
+    lower = min(rate_hz, target_hz)
+    up = int(np.ceil(_OVERSAMPLED * lower / rate_hz))
+    half = int(np.ceil(REACH * up * rate_hz / lower))
+    taps = firwin(2 * half + 1, (BAND + _GONE) / 2 * lower, window=("kaiser", _KAISER),
+                  fs=up * rate_hz)
+    reach = -(-half // up) + _MARGIN
+    # outputs of one block, so that little is in memory at a time
+    block = max(1, int(max(_BLOCK, 8 * reach) * target_hz / rate_hz))
+    result = np.empty((count, values.shape[1]))
+    means = values.mean(axis=0)
+    moving = np.ptp(values, axis=0) > 0
+    result[:] = means
+    for first in range(0, count, block):
+        rows = np.arange(first, min(first + block, count))
+        place = (target_start_s + rows / target_hz - start_s) * rate_hz
+        low = max(int(place[0]) - reach, 0)
+        part = slice(low, max(int(place[-1]) + reach + 1, low + 1))
+        for axis in np.flatnonzero(moving):
+            x = values[part, axis] - means[axis]
+            fine = resample_poly(x, up, 1, window=taps) if up > 1 else \
+                oaconvolve(x, taps, mode="full")[half:half + len(x)]
+            result[rows, axis] += map_coordinates(fine, [(place - low) * up], order=_DEGREE,
+                                                  mode="nearest")
+    return result
+
+
+def untouched(present, rate_hz, start_s, target_hz, target_start_s, count):
+    """Whether each wanted instant is far enough from samples that are not present."""
+    if present.all():
+        return np.ones(count, bool)
+    interval = rate_hz / min(rate_hz, target_hz)
+    place = (target_start_s + np.arange(count) / target_hz - start_s) * rate_hz
+    edges = np.flatnonzero(np.diff(np.r_[True, present, True].astype(np.int8)))
+    starts, stops = edges[::2], edges[1::2]
+    free = np.ones(count, bool)
+    long = stops - starts > interval / 2
+    for which, intervals in ((~long, _TOUCHED), (long, _TOUCHED_LONG)):
+        gaps = starts[which] - intervals * interval, stops[which] - 1 + intervals * interval
+        # no more gaps begin before an instant than have ended
+        free &= np.searchsorted(gaps[0], place) == np.searchsorted(gaps[1], place)
+    return free
+
+
+def filled(slot, values):
+    """Values on all whole instants from the first slot to the last, and which of them are present.
+
+    Parameters
+    ----------
+    slot : ndarray of whole numbers, shape (n,), ascending
+    values : ndarray, shape (n, 3)
+    """
+    if len(slot) == slot[-1] - slot[0] + 1 and np.all(np.diff(slot) == 1):
+        return values, np.ones(len(slot), bool)
+    first = np.r_[True, np.diff(slot) > 0]
+    slot, values = slot[first], values[first]
+    place = (slot - slot[0]).astype(np.int64)
+    present = np.zeros(place[-1] + 1, bool)
+    present[place] = True
+    missing = np.flatnonzero(~present)
+    result = np.empty((len(present), values.shape[1]))
+    result[place] = values
+    steps = np.diff(place)
+    long = np.repeat(steps - 1 > _SPLINED, np.maximum(steps - 1, 0))
+    if len(missing):
+        result[missing] = CubicSpline(place, values)(missing)
+        result[missing[long]] = np.stack(
+            [np.interp(missing[long], place, values[:, i]) for i in range(values.shape[1])], 1)
+    return result, present
+
+
+def on_grid(seconds, values, rate_hz):
+    """Values with uneven stamps on a uniform grid from the first stamp on.
+
+    A cubic spline by stamps, after those that are almost the same have become one.
+
+    Returns
+    -------
+    values : ndarray, shape (m, 3)
+    present : ndarray of bool, shape (m,)
+        False within gaps of more than three of the longer steps.
+    """
+    seconds, values = merged(seconds, values)
+    steps = np.diff(seconds)
+    grid = seconds[0] + np.arange(int((seconds[-1] - seconds[0]) * rate_hz) + 1) / rate_hz
+    wide = steps > 3 * np.percentile(steps, 95)
+    within = np.clip(np.searchsorted(seconds, grid, side="right") - 1, 0, len(steps) - 1)
+    result = CubicSpline(seconds, values)(grid)
+    gap = wide[within]
+    if gap.any():
+        result[gap] = np.stack([np.interp(grid[gap], seconds, values[:, i])
+                                for i in range(values.shape[1])], 1)
+    return result, ~gap

@@ -1,0 +1,193 @@
+"""What the samples of one topic say by themselves: clock, lattice of values, limits, faults."""
+
+import dataclasses
+import functools
+
+import numpy as np
+
+from ..errors import FracAccelError
+from .clipping import certain, pile_up
+from .clock import Clock, require_span, usable
+from .lattice import lattice_step
+
+_FEWEST = 32
+# Scatter of the stamps [sampling intervals] below which it counts as none.
+_JITTER = 2e-4
+
+
+@dataclasses.dataclass(frozen=True)
+class Integrity:
+    """Findings about the data of one axis.
+
+    Attributes
+    ----------
+    samples : int
+        Usable samples.
+    missing : int
+        Instants of the topic's clock without a sample.
+    duplicates, stamps_back, not_finite : int
+        Samples that were left out for it.
+    jitter_rms_s : float
+        Scatter of the stamps about a uniform clock.
+    step : float or None
+        Distance of the values' lattice [output units].
+    lower, upper : float or None
+        Limits at which samples pile up.
+    words : list of str
+    """
+
+    samples: int
+    missing: int
+    duplicates: int
+    stamps_back: int
+    not_finite: int
+    jitter_rms_s: float
+    step: float | None
+    lower: float | None
+    upper: float | None
+    words: list
+
+    @property
+    def dropped_fraction(self):
+        """Share of the instants without a sample."""
+        return self.missing / (self.samples + self.missing)
+
+
+class Topic:
+    """Usable samples of one topic; what is found of them is found once.
+
+    Parameters
+    ----------
+    samples : Samples
+    name : str
+        What they are, for messages.
+
+    Attributes
+    ----------
+    stamps_ns : ndarray of int64, shape (n,)
+        Ascending.
+    values : ndarray, shape (n, 3)
+        Finite.
+    index : ndarray of int, shape (n,), or None
+        Their places among all samples; None where all are usable.
+    duplicates, stamps_back, not_finite : int
+        Numbers of the others.
+
+    Raises
+    ------
+    FracAccelError
+        If fewer than 32 samples are usable, or they are spread too far.
+    """
+
+    def __init__(self, samples, name, fewest=_FEWEST):
+        good = usable(samples)
+        self.name = name
+        self.index = None if good.all() else np.flatnonzero(good)
+        self.stamps_ns, self.values = (values if self.index is None else values[self.index]
+                                       for values in (samples.stamps_ns, samples.values))
+        if len(self) < fewest:
+            raise FracAccelError(f"{name}: {len(self)} usable sample(s), expected at least "
+                                 f"{fewest} whose stamps advance and whose values are finite"
+                                 + _jump(samples.stamps_ns))
+        require_span(self.stamps_ns, name)
+        self._useless = np.empty(0, np.int64)
+        self.duplicates = self.stamps_back = self.not_finite = 0
+        if self.index is not None:
+            finite = np.isfinite(samples.values).all(axis=1)
+            self._useless = samples.stamps_ns[~finite]
+            self.not_finite = len(self._useless)
+            self.duplicates = int(np.sum(np.diff(samples.stamps_ns[finite]) == 0))
+            self.stamps_back = max(len(good) - len(self) - self.duplicates - self.not_finite, 0)
+        self._found = {}
+
+    def __len__(self):
+        return len(self.stamps_ns)
+
+    @functools.cached_property
+    def clock(self):
+        """The `Clock` behind its stamps."""
+        return Clock.of(self.stamps_ns)
+
+    def shift(self, seconds):
+        """Move all stamps; what has been found of them holds as it is."""
+        self.stamps_ns = self.stamps_ns + round(seconds * 1e9)
+        self._useless = self._useless + round(seconds * 1e9)
+
+    @functools.cached_property
+    def missing(self):
+        """Number of instants without a sample; a message whose value is no number came."""
+        slot = self.clock.slot
+        if not len(slot):
+            return 0
+        useless = np.round((self._useless - self.stamps_ns[0]) * 1e-9 * self.clock.rate_hz)
+        useless = useless[(useless > slot[0]) & (useless < slot[-1])]
+        here = len(np.union1d(slot, useless)) if len(useless) else \
+            1 + int(np.count_nonzero(np.diff(slot)))
+        return int(slot[-1] - slot[0] + 1 - here)
+
+    def step(self, column):
+        """Step of the lattice that one axis' values lie on, or None."""
+        return self._once("step", column, lambda: lattice_step(self.values[:, column]))
+
+    def limits(self, column):
+        """Lower and upper limit at which one axis' samples pile up beyond doubt, or None."""
+        def find():
+            values = self.values[:, column]
+            step = self.step(column)
+            low, high = (certain(pile_up(side * values), step) for side in (-1, 1))
+            return None if low is None else -low, high
+        return self._once("limits", column, find)
+
+    def integrity(self, column, own_instants=True):
+        """`Integrity` of one axis; of values on other instants, what still holds of them."""
+        clock = self.clock
+        jitter = clock.scatter_s if clock.scatter_s * clock.rate_hz > _JITTER else 0.0
+        step, (lower, upper) = self.step(column), self.limits(column)
+        words = self._stamp_words(jitter)
+        if step:
+            words.append(f"the values are multiples of {step:.6g}")
+        for limit, side in ((lower, "lower"), (upper, "upper")):
+            if limit is not None:
+                count = int(np.sum(self.values[:, column] == limit))
+                words.append(f"{count} samples lie exactly at the {side} limit {limit:.6g}")
+        if not own_instants:
+            jitter, step, lower, upper = 0.0, None, None, None
+        return Integrity(len(self), self.missing if own_instants else 0, self.duplicates,
+                         self.stamps_back, self.not_finite, jitter, step, lower, upper, words)
+
+    def _stamp_words(self, jitter):
+        words, clock = [], self.clock
+        if self.missing:
+            total = len(self) + self.missing
+            words.append(f"{self.missing} of {total} samples are missing "
+                         f"({self.missing / total:.2%})")
+        for number, what in ((self.duplicates, "repeat a stamp"),
+                             (self.stamps_back, "have a stamp that goes back"),
+                             (self.not_finite, "are not finite")):
+            if number:
+                words.append(f"{number} samples {what} and are left out")
+        if clock.kind == "uneven":
+            steps = np.percentile(np.diff(self.stamps_ns), [5, 95]) * 1e-9
+            words.append(f"the stamps are uneven: 90 % of the steps last {steps[0]:.3g} to "
+                         f"{steps[1]:.3g} s")
+        elif clock.kind == "batches":
+            words.append(f"the samples come in batches: their instants are taken as uniform at "
+                         f"{clock.rate_hz:.6g} Hz")
+        elif jitter:
+            words.append(f"the stamps scatter by {jitter:.3g} s (RMS), "
+                         f"{jitter * clock.rate_hz:.2%} of the sampling interval")
+        return words
+
+    def _once(self, what, column, find):
+        if (what, column) not in self._found:
+            self._found[what, column] = find()
+        return self._found[what, column]
+
+
+def _jump(stamps_ns):
+    """Words for the stamp behind which all others go back, or none."""
+    steps = np.diff(stamps_ns.astype(float))
+    if not len(steps) or np.max(steps) <= 0 or steps.min() > -steps.max() / 2:
+        return ""
+    return (f": {1e-9 * (float(stamps_ns[int(np.argmax(steps))]) - float(stamps_ns[0])):.6g} s "
+            f"after the start the stamps jump by {1e-9 * steps.max():.6g} s, and go back then")
