@@ -1,0 +1,165 @@
+"""Filters of several inputs, fitted to a residual by least squares and judged by other blocks."""
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.signal import oaconvolve
+
+from .blocks import FOLDS
+
+# Ridge, of the mean diagonal of the products.
+_RIDGE = 1e-9
+
+
+class Filters:
+    r"""Prediction :math:`p_t = \sum_i \sum_k h_{ik} u_{i,t-k}` of a residual.
+
+    The products of the shifted inputs over a run of samples follow from their first row and column:
+    :math:`G_{j+1,k+1} = G_{jk} + a_{s-1-j} b_{s-1-k} - a_{e-1-j} b_{e-1-k}` for the run from s to e
+    (covariance method; L. Ljung, *System Identification*, 2nd ed., 1999, section 10.1), so that
+    they cost no more than the shifts do.
+
+    Parameters
+    ----------
+    inputs : list of ndarray, shape (n,)
+    lags : list of (int, int)
+        First and last lag of each input [samples]; negative ones look ahead.
+    blocks : Blocks
+    used : ndarray of bool, shape (n,)
+        Samples that count.
+    """
+
+    def __init__(self, inputs, lags, blocks, used):
+        self._lags, self._blocks, self._used = lags, blocks, used
+        self._pad = max(max(-low, high) for low, high in lags) + 1
+        self._inputs = [np.pad(values, self._pad) for values in inputs]
+        self._guard = max(high - low for low, high in lags)
+        self.size = sum(high - low + 1 for low, high in lags)
+        self._runs = [blocks.guarded(block, self._guard) for block in range(len(blocks))]
+        whole = self._gram(0, blocks.n)
+        self._grams = np.repeat(whole[None], FOLDS, axis=0)
+        for block, run in enumerate(self._runs):
+            self._grams[block % FOLDS] -= self._gram(*run)
+
+    def predict(self, target, left_out=None):
+        """Prediction of each block by the filter that the others outside its guards give.
+
+        Parameters
+        ----------
+        target : ndarray, shape (n,)
+        left_out : ndarray of bool, shape (n,), optional
+            Further samples that do not count.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+        used, grams = self._used, self._grams
+        if left_out is not None and left_out.any():
+            used = used & ~left_out
+            grams = grams - self._products_of(np.flatnonzero(left_out & self._used))
+        values = np.where(used, target, 0.0)
+        whole = self._right(values, 0, len(values))
+        rights = np.repeat(whole[None], FOLDS, axis=0)
+        for block, run in enumerate(self._runs):
+            rights[block % FOLDS] -= self._right(values, *run)
+        result = np.zeros(len(values))
+        weights = [_solve(gram, right) for gram, right in zip(grams, rights)]
+        for block, start, stop in self._blocks:
+            result[start:stop] = self._output(weights[block % FOLDS], start, stop)
+        return result
+
+    def _gram(self, start, stop):
+        """Products of all shifted inputs over a run of samples that count."""
+        offsets = np.cumsum([0] + [high - low + 1 for low, high in self._lags])
+        gram = np.zeros((self.size, self.size))
+        for i, (a, span) in enumerate(zip(self._inputs, self._lags)):
+            for j, (b, other) in list(enumerate(zip(self._inputs, self._lags)))[i:]:
+                part = self._pair(a, b, span, other, start, stop)
+                gram[offsets[i]:offsets[i + 1], offsets[j]:offsets[j + 1]] = part
+                gram[offsets[j]:offsets[j + 1], offsets[i]:offsets[i + 1]] = part.T
+        unused = start + np.flatnonzero(~self._used[start:stop])
+        if len(unused):
+            gram -= self._outer(unused)
+        return gram
+
+    def _pair(self, a, b, span, other, start, stop):
+        rows, columns = span[1] - span[0] + 1, other[1] - other[0] + 1
+        part = np.empty((rows, columns))
+        part[0] = self._shifted_sums(self._run(a, start - span[0], stop - span[0]), b, other, start,
+                                     stop)
+        part[:, 0] = self._shifted_sums(self._run(b, start - other[0], stop - other[0]), a, span,
+                                        start, stop)
+        change = (np.outer(self._shifts(a, span, start - 1), self._shifts(b, other, start - 1))
+                  - np.outer(self._shifts(a, span, stop - 1), self._shifts(b, other, stop - 1)))
+        for row in range(1, rows):
+            part[row, 1:] = part[row - 1, :-1] + change[row - 1, :-1]
+        return part
+
+    def _run(self, values, start, stop):
+        """Padded input from one sample to another, both of the record's counting."""
+        return values[start + self._pad:stop + self._pad]
+
+    def _shifts(self, values, span, at):
+        """Values of an input at one sample, at all lags."""
+        return values[at - np.arange(span[0], span[1] + 1) + self._pad]
+
+    def _shifted_sums(self, fixed, values, span, start, stop):
+        """Sums of one run times an input at all lags."""
+        moving = self._run(values, start - span[1], stop - span[0])
+        return np.correlate(moving, fixed, "valid")[::-1]
+
+    def _right(self, target, start, stop):
+        return np.concatenate([
+            self._shifted_sums(target[start:stop], values, span, start, stop)
+            for values, span in zip(self._inputs, self._lags)])
+
+    def _outer(self, rows):
+        """Products over single samples."""
+        total = np.zeros((self.size, self.size))
+        for some in np.array_split(rows, len(rows) // 4096 + 1):
+            matrix = np.concatenate([
+                values[some[:, None] - np.arange(low, high + 1) + self._pad]
+                for values, (low, high) in zip(self._inputs, self._lags)], axis=1)
+            total += matrix.T @ matrix
+        return total
+
+    def _products_of(self, rows):
+        """Products over single samples, by fold that would learn from them."""
+        result = np.repeat(self._outer(rows)[None], FOLDS, axis=0)
+        for block, (start, stop) in enumerate(self._runs):
+            here = rows[(rows >= start) & (rows < stop)]
+            if len(here):
+                result[block % FOLDS] -= self._outer(here)
+        return result
+
+    def _output(self, weights, start, stop):
+        total, first = np.zeros(stop - start), 0
+        for values, (low, high) in zip(self._inputs, self._lags):
+            taps = weights[first:first + high - low + 1]
+            first += len(taps)
+            run = self._run(values, start - high, stop - low)
+            total += (np.convolve(run, taps, "valid") if len(taps) < 64
+                      else oaconvolve(run, taps, "valid"))
+        return total
+
+
+def _solve(gram, right):
+    """Weights of the least squares, of inputs scaled to the same size."""
+    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    there = scale > 1e-12 * max(scale.max(), 1e-300)
+    weights = np.zeros(len(right))
+    if not there.any() or not np.any(right):
+        return weights
+    size = scale[there]
+    scaled = gram[np.ix_(there, there)] / np.outer(size, size)
+    ridge = _RIDGE
+    while ridge < 1:
+        scaled[np.diag_indices_from(scaled)] += ridge
+        try:
+            factor = cho_factor(scaled, check_finite=False)
+        except np.linalg.LinAlgError:
+            ridge *= 100
+            continue
+        weights[there] = cho_solve(factor, right[there] / size, check_finite=False) / size
+        break
+    return weights
