@@ -54,6 +54,17 @@ class Blocks:
         """Samples of the usual short block (the lower decile)."""
         return int(np.quantile(np.diff(self.edges), 0.1))
 
+    def coarser(self, length):
+        """Fewer blocks, each put together of the same number, of about a length at least."""
+        together = 1
+        while self.shortest * together < length and len(self) // (2 * together) >= FOLDS:
+            together *= 2
+        return Blocks(np.unique(np.r_[self.edges[::together], self.n])) if together > 1 else self
+
+    def thinned(self, step):
+        """Blocks of every step-th sample."""
+        return Blocks(np.unique(-(-self.edges // step)))
+
     def __iter__(self):
         return zip(range(len(self)), self.edges[:-1], self.edges[1:])
 

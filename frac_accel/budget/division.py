@@ -7,7 +7,7 @@ from scipy.fft import rfft
 
 from ..identification.recognise import recognise
 from . import repeats, shapes, unrelated
-from .blocks import Blocks, intervals
+from .blocks import FOLDS, Blocks, intervals
 from .filters import Filters
 from .modulated import modulated
 
@@ -27,7 +27,7 @@ WORDS = {
     "reference": "shared with the second sensor: reference or fixture",
     "noise": "nothing in the record predicts it"}
 # Lags [samples] of the filters that are tried: ahead, behind.
-_LENGTHS = ((0, 0), (-1, 2), (-4, 8), (-12, 24), (-32, 96), (-64, 448))
+_LENGTHS = ((0, 0), (-1, 2), (-4, 8), (-12, 24), (-32, 96), (-64, 448), (-64, 960))
 _ALWAYS = 5
 _SHAPE_LENGTHS = ((0, 0), (-1, 2), (-4, 12))
 # A filter of the likeliest shapes that may ring as the sensor does.
@@ -40,6 +40,8 @@ _MOVES = 1e-10
 _COURSES = (1, 2, 4, 8, 16)
 # Standard errors by which a longer filter must take more of the judged blocks.
 _BETTER = 1.0
+# Error of a fit to coloured noise, over that of one to white noise.
+_COLOURED = 4.0
 # A clipped prediction before anything is known of outliers.
 _CLIPPED = 5.0
 _STRETCHES = 10
@@ -47,6 +49,11 @@ _OCTAVES = 6
 # Energy of the reference below which lies what counts as slower than it, and that of a tone's
 # peaks from which the reference is made of tones.
 _LOWEST = 0.01
+# Energy below which all of the reference's band lies, samples of its fastest cycle that are enough
+# for a filter of it and its harmonics, and samples that must stay.
+_HIGHEST = 0.995
+_FASTER = 8
+_FEWEST = 1000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,7 +137,7 @@ class Division:
         self._filters = {}
         self._period = None
         energy = np.cumsum(np.abs(rfft(self.x * np.hanning(self.n)))**2)
-        self.lowest = max(np.searchsorted(energy, _LOWEST * energy[-1]) / self.n, 1 / self.n)
+        self.lowest = max(np.searchsorted(energy, _LOWEST * energy[-1]), 1) / self.n
         self._lines_of_reference()
 
     @property
@@ -167,13 +174,13 @@ class Division:
                 continue
             place, _, ratio = unrelated.spectrum_peaks(values)
             self.ratio = np.maximum(self.ratio, ratio)
-            if len(place) <= unrelated._FEW_TONES:
+            if len(place) <= unrelated.FEW_TONES:
                 self.tones = np.r_[self.tones, place / self.n]
 
-    def fits(self, coefficients, span):
+    def fits(self, coefficients, span, step):
         """Whether the record is long enough for a filter."""
-        return coefficients * _SAMPLES <= self.used.sum() \
-            and (span <= 1 or span <= self.blocks.shortest)
+        return coefficients * _SAMPLES * step <= self.used.sum() and (
+            span <= 1 or 2 * span * step <= self.blocks.shortest * len(self.blocks) / FOLDS)
 
     def filters(self, key, make):
         """Filters of the reference, kept for the next budget."""
@@ -190,7 +197,17 @@ class _One:
         self.measured = np.asarray(measured, float)
         self.simulated = np.asarray(simulated, float)
         self.flagged = np.zeros(record.n, bool)
-        self.predicted, self.kept, self.chosen = {}, {}, {}
+        self.step = self._step()
+        self.predicted, self.kept, self.chosen, self.sizes = {}, {}, {}, {}
+
+    def _step(self):
+        """Samples of a lag: more than one where motion and residual are far slower than that."""
+        r = self.r
+        highest = 0.0
+        for values in (r.x, self.e - self.e[r.used].mean()):
+            energy = np.cumsum(np.abs(rfft(values * r.used * np.hanning(r.n)))**2)
+            highest = max(highest, np.searchsorted(energy, _HIGHEST * energy[-1]) / r.n)
+        return int(np.clip(1 / (_FASTER * max(highest, 1e-9)), 1, max(r.n // _FEWEST, 1)))
 
     def budget(self):
         r = self.r
@@ -198,6 +215,8 @@ class _One:
         # what is far below the output's own digits is nothing
         if not power > 1e-28 * max(float(np.mean(self.measured[r.used]**2)), 1e-300):
             return self._made([], np.zeros((0, r.n)), power)
+        # an offset is no other part's
+        self.predicted["slow"] = np.full(r.n, np.median(self.e[r.used]))
         self._bursts_first()
         self._pass()
         self._find_bursts(self.e - sum(self.predicted.values()))
@@ -207,15 +226,17 @@ class _One:
     def _bursts_first(self):
         """Bursts, before any other part is known: beside a fit to clipped values."""
         r = self.r
-        size = _CLIPPED * unrelated.scale(self.e, self._motion(), r.used)
-        clipped = np.clip(self.e, -size, size)
+        moving = np.where(r.used, self.e - self.predicted["slow"], 0.0)
+        size = _CLIPPED * unrelated.scale(moving, self._motion(), r.used)
+        clipped = np.clip(moving, -size, size)
         predicted = np.zeros(r.n)
         if r.moves:
-            lengths = [length for length in _LENGTHS[:4] if r.fits(*_span(length))] or _LENGTHS[:1]
+            lengths = [length for length in _LENGTHS[:4] if r.fits(*_span(length), self.step)]
+            lengths = lengths or _LENGTHS[:1]
             predicted = self._reference_filters(lengths[-1]).predict(clipped)
             if np.sum((clipped - predicted)[r.used]**2) > np.sum(clipped[r.used]**2):
                 predicted = np.zeros(r.n)
-        self._find_bursts(self.e - predicted)
+        self._find_bursts(moving - predicted)
 
     def _find_bursts(self, rest):
         self.flagged = unrelated.bursts(rest, self._motion(), self.r.used)
@@ -225,12 +246,16 @@ class _One:
 
     def _reference_filters(self, length):
         r = self.r
-        return r.filters(("linear", length), lambda: Filters([r.x], [length], r.blocks, r.used))
+        return r.filters(("linear", length, self.step), lambda: Filters(
+            [r.x], [length], r.blocks, r.used, self.step))
 
     def _pass(self):
         """Each part from what the others leave, in their order."""
+        self.inputs, self.own, self.output = {}, {}, None
         for part in PARTS[1:-2]:
-            others = [values for name, values in self.predicted.items() if name != part]
+            # what repeats contains every other part of a repeated motion
+            others = [values for name, values in self.predicted.items()
+                      if name not in (part, "distortion") or part == "distortion" != name]
             target = self.e - sum(others) if others else self.e.copy()
             target[self.flagged] = 0.0
             self.predicted.pop(part, None)
@@ -251,17 +276,17 @@ class _One:
         best = first = None
         best_gain = np.zeros(len(self.r.blocks))
         worse = 0
-        for place, (name, make) in enumerate(self._candidates(part, target)):
+        for place, (name, size, make) in enumerate(self._candidates(part, target)):
             if part in self.chosen and name != self.chosen[part]:
                 continue
             predicted = np.where(judged, make(), 0.0)
             gains = self.r.blocks.sums((2 * target - predicted) * predicted)
             if first is None:
-                first = name, predicted
+                first = name, predicted, size
             more = gains - best_gain
             error = np.sqrt(len(more)) * np.std(more)
             if more.sum() > _BETTER * error and more.sum() > 0:
-                best, best_gain, worse = (name, predicted), gains, 0
+                best, best_gain, worse = (name, predicted, size), gains, 0
             else:
                 worse += 1
                 if worse > 1 and place >= _ALWAYS:
@@ -270,11 +295,12 @@ class _One:
             return None
         if part not in self.chosen:
             self.chosen[part] = (best or first)[0]
-        name, estimate = best or first
+        _, estimate, self.sizes[part] = best or first
         return (estimate if best else np.zeros(self.r.n)), estimate
 
     def _candidates(self, part, target):
-        """Names and makers of predictions of one part, the simplest ones first."""
+        """Names, numbers of coefficients and makers of predictions of one part, the simplest ones
+        first."""
         return getattr(self, f"_{part}_candidates")(target)
 
     def _lines_candidates(self, target):
@@ -283,9 +309,10 @@ class _One:
             rest = np.where(self.counted, target, 0.0)
             self.frequencies = unrelated.tones(rest, r.ratio, r.tones, r.period, self.counted)
         if len(self.frequencies):
-            for count, orders in enumerate((1, 4, 12)):
+            for count, orders in enumerate(unrelated.LINE_COURSES):
                 if 2 * orders <= len(r.blocks):
-                    yield count, lambda orders=orders: modulated(
+                    size = 2 * orders * len(self.frequencies)
+                    yield count, size, lambda orders=orders: modulated(
                         unrelated.tone_waves(self.frequencies), range(orders), target,
                         self.counted, r.blocks)
 
@@ -294,24 +321,23 @@ class _One:
         if not r.moves:
             return
         for length in _LENGTHS:
-            if r.fits(*_span(length)):
-                yield length, lambda length=length: self._reference_filters(length).predict(
-                    target, self.flagged)
+            if r.fits(*_span(length), self.step):
+                yield length, _span(length)[0], lambda length=length: self._reference_filters(
+                    length).predict(target, self.flagged)
         alike = np.corrcoef(self.simulated[r.used], r.x[r.used])[0, 1] \
             if np.ptp(self.simulated[r.used]) else 1.0
         length = ((-1, 2), (-4, 8))
-        if abs(alike) < 0.9999 and r.fits(17, 13):
-            yield "both", lambda: self._own_filters(
+        if abs(alike) < 0.9999 and r.fits(17, 13, self.step):
+            yield "both", 17, lambda: self._own_filters(
                 "linear", [r.x, shapes.standardised(self.simulated, r.used)], length).predict(
                     target, self.flagged)
 
     def _own_filters(self, key, inputs, lags):
-        """Filters of this model's own inputs, kept for the second pass."""
-        filters = self.__dict__.setdefault("own", {})
+        """Filters of this model's own inputs, kept for one pass."""
         key = key, tuple(lags)
-        if key not in filters:
-            filters[key] = Filters(inputs, lags, self.r.blocks, self.r.used)
-        return filters[key]
+        if key not in self.own:
+            self.own[key] = Filters(inputs, lags, self.r.blocks, self.r.used, self.step)
+        return self.own[key]
 
     def _across_candidates(self, target):
         r = self.r
@@ -320,10 +346,10 @@ class _One:
             return
         for length in _LENGTHS[:5]:
             size, span = _span(length)
-            if r.fits(size * len(others), span):
-                yield length, lambda length=length: r.filters(
-                    ("across", length), lambda: Filters(
-                        others, [length] * len(others), r.blocks, r.used)).predict(
+            if r.fits(size * len(others), span, self.step):
+                yield length, size * len(others), lambda length=length: r.filters(
+                    ("across", length, self.step), lambda: Filters(
+                        others, [length] * len(others), r.blocks, r.used, self.step)).predict(
                             target, self.flagged)
 
     def _even_candidates(self, target):
@@ -336,23 +362,22 @@ class _One:
         r = self.r
         if not r.moves:
             return
-        inputs = self.__dict__.setdefault("inputs", {})
+        inputs = self.inputs
         if part not in inputs:
             inputs[part] = make(self._output(), r.used)
         trials = [(count, length) for length in _SHAPE_LENGTHS for count in (1, len(inputs[part]))]
         for count, length in (*trials, _RINGING):
             size, span = _span(length)
-            if r.fits(count * size, span):
-                yield (count, length), lambda count=count, length=length: self._own_filters(
-                    part, inputs[part][:count], [length] * count).predict(target, self.flagged)
-        if part in self.chosen:
-            inputs[part] = []
+            if r.fits(count * size, span, self.step):
+                yield (count, length), count * size, lambda count=count, length=length: (
+                    self._own_filters(part, inputs[part][:count], [length] * count).predict(
+                        target, self.flagged))
 
     def _output(self):
-        """The output as the best linear description has it: what a spring's force follows."""
-        if "output" not in self.__dict__:
-            linear = self.predicted.get("linear", 0.0)
-            self.output = self.simulated + linear
+        """The output as the parts found so far have it: what a spring's force follows."""
+        if self.output is None:
+            self.output = self.simulated + sum(
+                self.predicted.get(part, 0.0) for part in ("linear", "even", "odd"))
             if not np.ptp(self.output):
                 self.output = self.r.x
         return self.output
@@ -371,18 +396,18 @@ class _One:
             return np.stack([base[start:stop] for base in bases], axis=1)
         for count in _COURSES:
             if count * len(bases) * _SAMPLES <= r.used.sum() and 2 * count <= len(r.blocks):
-                yield count, lambda count=count: modulated(
+                yield count, count * len(bases), lambda count=count: modulated(
                     columns, range(1, count + 1), target, self.counted, r.blocks)
 
     def _slow_candidates(self, target):
         for count, values in enumerate(unrelated.slow_candidates(
                 target, self.counted, self.r.lowest, target)):
-            yield count, lambda values=values: values
+            yield count, unrelated.FEWEST * 2**count, lambda values=values: values
 
     def _distortion_candidates(self, target):
         r = self.r
         if r.period and r.n >= 2 * r.period:
-            yield 0, lambda: repeats.repeating(target, self.counted, r.period)
+            yield 0, r.period, lambda: repeats.repeating(target, self.counted, r.period)
 
     def _summed(self, power):
         """Shares from the held-out products of what is left and what is predicted."""
@@ -401,14 +426,15 @@ class _One:
             if part not in self.kept:
                 continue
             later = sum((self.predicted[name] for name in PARTS[PARTS.index(part) + 1:]
-                         if name in self.predicted), np.zeros(r.n))
-            target = np.where(counted, left - later, 0.0)
-            estimate = self.kept[part]
+                         if name in self.predicted and name != "distortion"), np.zeros(r.n))
+            estimate = np.where(counted, self.kept[part], 0.0)
+            # what is taken is taken from what the earlier ones left: so do the shares add up
+            alone = np.where(counted, left - later, 0.0)
+            target = left if self.predicted[part].any() else alone
             for name, piece in self._by_parity(part, estimate):
+                reductions.append((2 * target - piece) * piece)
                 names.append(name)
-                products.append(target * piece)
-                reductions.append((2 * target - piece) * piece if piece is estimate
-                                  else target * piece)
+                products.append(reductions[-1] + self._error(alone, piece, self.sizes[part]))
                 spectra[name + str(len(names))] = target, piece
             left -= np.where(counted, self.predicted[part], 0.0)
         if self.other is not None:
@@ -419,6 +445,18 @@ class _One:
             spectra["reference" + str(len(names))] = left, other
         return self._made(names, np.array(products), power, np.array(reductions),
                           burst + background, list(spectra.values()))
+
+    def _error(self, target, predicted, size):
+        """Power of a fit's own error, by which held-out data lose less than it explains.
+
+        Per sample. It is what the prediction has more than it shares with the target, but no more than a few
+        times what as many coefficients fit to noise.
+        """
+        counted = self.counted
+        error = np.sum((predicted - target) * predicted)
+        left = np.sum((target - predicted)[counted]**2)
+        most = _COLOURED * min(size / counted.sum(), 1.0) * left
+        return counted * (np.clip(error, 0.0, most) / counted.sum())
 
     def _by_parity(self, part, estimate):
         """Distortion on even and odd lines, where these can be told apart."""
@@ -454,7 +492,7 @@ class _One:
             left = self.r.blocks.sums(weights).sum()
             band_rest = _band_power(self.e, self.e, edges, r.rate) / left
             time_rest = np.add.reduceat(weights, stretches[:-1]) / left
-            for place, (name, rows) in enumerate(merged.items()):
+            for name, rows in merged.items():
                 in_bands[name] = sum(_band_power(*spectra[i], edges, r.rate) for i in rows) / left
                 along[name] = np.add.reduceat(products[rows].sum(axis=0), stretches[:-1]) / left
                 band_rest, time_rest = band_rest - in_bands[name], time_rest - along[name]

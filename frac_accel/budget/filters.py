@@ -1,13 +1,15 @@
 """Filters of several inputs, fitted to a residual by least squares and judged by other blocks."""
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import oaconvolve
 
 from .blocks import FOLDS
 
-# Ridge, of the mean diagonal of the products.
-_RIDGE = 1e-9
+# Ridges, of the products of inputs scaled to the same size: what the excitation hardly holds must
+# not be fitted to noise.
+_RIDGES = (1e-9, 1e-6, 1e-4, 1e-2)
 
 
 class Filters:
@@ -26,19 +28,40 @@ class Filters:
     blocks : Blocks
     used : ndarray of bool, shape (n,)
         Samples that count.
+    step : int
+        Lags count in so many samples, where the inputs are that much slower than the record.
+        Inputs and residual are then smoothed alike before every step-th sample is taken, which
+        leaves the filter between them as it is.
     """
 
-    def __init__(self, inputs, lags, blocks, used):
-        self._lags, self._blocks, self._used = lags, blocks, used
+    def __init__(self, inputs, lags, blocks, used, step=1):
+        self._step, self._all = step, used
+        self._lags = lags
         self._pad = max(max(-low, high) for low, high in lags) + 1
-        self._inputs = [np.pad(values, self._pad) for values in inputs]
+        self._outputs = [np.pad(values[::step], self._pad) for values in inputs]
+        if step > 1:
+            blocks = blocks.thinned(step)
+            inputs = [_thinned(values, step) for values in inputs]
+            used = used[::step]
+        self._blocks, self._used = blocks, used
+        self._inputs = [np.pad(values, self._pad) for values in inputs] if step > 1 \
+            else self._outputs
         self._guard = max(high - low for low, high in lags)
         self.size = sum(high - low + 1 for low, high in lags)
-        self._runs = [blocks.guarded(block, self._guard) for block in range(len(blocks))]
-        whole = self._gram(0, blocks.n)
+        # what lies before the record and after it is not known
+        self._first = max(0, *(high for _, high in lags))
+        self._last = blocks.n + min(0, *(low for low, _ in lags))
+        # long filters need long blocks between their guards
+        self._blocks = blocks = blocks.coarser(2 * self._guard)
+        self._runs = [self._within(*blocks.guarded(block, self._guard))
+                      for block in range(len(blocks))]
+        whole = self._gram(*self._within(0, blocks.n))
         self._grams = np.repeat(whole[None], FOLDS, axis=0)
         for block, run in enumerate(self._runs):
             self._grams[block % FOLDS] -= self._gram(*run)
+
+    def _within(self, start, stop):
+        return min(max(start, self._first), self._last), max(min(stop, self._last), self._first)
 
     def predict(self, target, left_out=None):
         """Prediction of each block by the filter that the others outside its guards give.
@@ -53,17 +76,40 @@ class Filters:
         -------
         ndarray, shape (n,)
         """
+        if self._step > 1:
+            counted = self._all if left_out is None else self._all & ~left_out
+            values = _thinned(np.where(counted, target, 0.0), self._step) \
+                / np.maximum(_thinned(counted.astype(float), self._step), 1e-3)
+            result = self._predict(values, None if left_out is None else left_out[::self._step])
+            return _thickened(result, self._step, len(target))
+        return self._predict(target, left_out)
+
+    def _predict(self, target, left_out):
         used, grams = self._used, self._grams
         if left_out is not None and left_out.any():
             used = used & ~left_out
             grams = grams - self._products_of(np.flatnonzero(left_out & self._used))
         values = np.where(used, target, 0.0)
-        whole = self._right(values, 0, len(values))
+        whole = self._right(values, *self._within(0, len(values)))
         rights = np.repeat(whole[None], FOLDS, axis=0)
         for block, run in enumerate(self._runs):
             rights[block % FOLDS] -= self._right(values, *run)
-        result = np.zeros(len(values))
-        weights = [_solve(gram, right) for gram, right in zip(grams, rights)]
+        judged = slice(self._first, self._last)
+        best, most = np.zeros(len(values)), 0.0
+        for ridge in _RIDGES:
+            result = self._held_out(grams, rights, ridge)
+            gain = float(np.sum(((2 * values - result) * result * used)[judged]))
+            if ridge == _RIDGES[0] or gain > most:
+                best, most = result, gain
+        for edge in (slice(0, self._first), slice(self._last, None)):
+            if np.sum(((2 * values - best) * best * used)[edge]) < 0:
+                best[edge] = 0.0
+        return best
+
+    def _held_out(self, grams, rights, ridge):
+        """Each block's output of the filter that the others give."""
+        weights = [solve(gram, right, ridge) for gram, right in zip(grams, rights)]
+        result = np.empty(self._blocks.n)
         for block, start, stop in self._blocks:
             result[start:stop] = self._output(weights[block % FOLDS], start, stop)
         return result
@@ -72,6 +118,8 @@ class Filters:
         """Products of all shifted inputs over a run of samples that count."""
         offsets = np.cumsum([0] + [high - low + 1 for low, high in self._lags])
         gram = np.zeros((self.size, self.size))
+        if stop <= start:
+            return gram
         for i, (a, span) in enumerate(zip(self._inputs, self._lags)):
             for j, (b, other) in list(enumerate(zip(self._inputs, self._lags)))[i:]:
                 part = self._pair(a, b, span, other, start, stop)
@@ -109,6 +157,8 @@ class Filters:
         return np.correlate(moving, fixed, "valid")[::-1]
 
     def _right(self, target, start, stop):
+        if stop <= start:
+            return np.zeros(self.size)
         return np.concatenate([
             self._shifted_sums(target[start:stop], values, span, start, stop)
             for values, span in zip(self._inputs, self._lags)])
@@ -125,6 +175,7 @@ class Filters:
 
     def _products_of(self, rows):
         """Products over single samples, by fold that would learn from them."""
+        rows = rows[(rows >= self._first) & (rows < self._last)]
         result = np.repeat(self._outer(rows)[None], FOLDS, axis=0)
         for block, (start, stop) in enumerate(self._runs):
             here = rows[(rows >= start) & (rows < stop)]
@@ -134,7 +185,7 @@ class Filters:
 
     def _output(self, weights, start, stop):
         total, first = np.zeros(stop - start), 0
-        for values, (low, high) in zip(self._inputs, self._lags):
+        for values, (low, high) in zip(self._outputs, self._lags):
             taps = weights[first:first + high - low + 1]
             first += len(taps)
             run = self._run(values, start - high, stop - low)
@@ -143,7 +194,19 @@ class Filters:
         return total
 
 
-def _solve(gram, right):
+def _thinned(values, step):
+    """Every step-th sample of values smoothed by a triangle, its weights adding up to 1."""
+    kernel = np.convolve(np.ones(step), np.ones(step)) / step**2
+    return np.convolve(values, kernel, "same")[::step]
+
+
+def _thickened(values, step, count):
+    """Back to all samples, by a cubic spline."""
+    place = np.arange(count) / step
+    return CubicSpline(np.arange(len(values)), values)(np.minimum(place, len(values) - 1))
+
+
+def solve(gram, right, ridge=_RIDGES[0]):
     """Weights of the least squares, of inputs scaled to the same size."""
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
     there = scale > 1e-12 * max(scale.max(), 1e-300)
@@ -152,7 +215,6 @@ def _solve(gram, right):
         return weights
     size = scale[there]
     scaled = gram[np.ix_(there, there)] / np.outer(size, size)
-    ridge = _RIDGE
     while ridge < 1:
         scaled[np.diag_indices_from(scaled)] += ridge
         try:

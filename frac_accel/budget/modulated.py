@@ -3,7 +3,7 @@
 import numpy as np
 
 from .blocks import FOLDS
-from .filters import _solve
+from .filters import solve
 
 # Stretches of each block in which the course of a weight counts as constant.
 _STRETCHES = 4
@@ -50,7 +50,7 @@ def modulated(columns, orders, target, used, blocks):
         gram = (pairs.T @ g.reshape(len(c), -1)).reshape(
             len(orders), len(orders), g.shape[1], g.shape[1]).transpose(0, 2, 1, 3)
         size = len(orders) * g.shape[1]
-        weights = _solve(gram.reshape(size, size), (c.T @ r).ravel())
+        weights = solve(gram.reshape(size, size), (c.T @ r).ravel())
         weights = course @ weights.reshape(len(orders), -1)
         for place in np.flatnonzero(judged):
             start, stop = runs[place]

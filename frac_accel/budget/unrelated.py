@@ -1,10 +1,8 @@
 """What a residual holds that has nothing to do with the motion: bursts, tones, a moving offset."""
 
 import numpy as np
-from scipy.fft import next_fast_len, rfft
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
-
-from .modulated import modulated
 
 # From median absolute value to the standard deviation of normal noise.
 _NORMAL = 1.4826
@@ -32,14 +30,16 @@ _FLOOR_BINS = 64
 _CHANCE = 12.0
 # Harmonics of a reference's own tones that its nonlinear answer may have.
 _HARMONICS = 10
-_FEW_TONES = 4
+FEW_TONES = 4
+# Median amplitude of a tone along the record, of its RMS.
+_LASTING = 0.5
 # Courses of a tone's amplitude and phase that are tried.
-_COURSES = (1, 4, 12)
+LINE_COURSES = (1, 4, 12)
 
 # Stretches in which an offset is constant, at most and at least, and the times of correlation that
 # such a stretch must last.
 _STRETCHES = 40
-_FEWEST = 8
+FEWEST = 8
 _TIMES = 10
 
 
@@ -182,6 +182,8 @@ def tones(values, reference_ratio, reference_tones, period, used):
                for k in range(1, _HARMONICS + 1)):
             continue
         frequency = _refined(values, peak / n)
+        if not _lasts(values, frequency, used):
+            continue
         if all(abs(frequency - other) > 3 / n for other in found):
             found.append(frequency)
         if len(found) == _TONES:
@@ -192,6 +194,16 @@ def tones(values, reference_ratio, reference_tones, period, used):
 def _folded_distance(frequency, other):
     other = other % 1
     return abs(frequency - min(other, 1 - other))
+
+
+def _lasts(values, frequency, used):
+    """Whether a tone is there most of the time, and not the ringing of one event."""
+    count = min(16, max(len(values) // 64, 4))
+    edges = np.linspace(0, len(values), count + 1).astype(int)[:-1]
+    turned = values * np.exp(-2j * np.pi * frequency * np.arange(len(values)))
+    size = np.abs(np.add.reduceat(turned, edges)) / np.maximum(
+        np.add.reduceat(used.astype(float), edges), 1)
+    return np.median(size) > _LASTING * np.sqrt(np.mean(size**2))
 
 
 def _refined(values, frequency):
@@ -215,14 +227,6 @@ def tone_waves(frequencies):
     return columns
 
 
-def line_candidates(frequencies, target, used, blocks):
-    """Predictions of tones, of constant amplitude first, then of slowly moving ones."""
-    columns = tone_waves(frequencies)
-    for count in _COURSES:
-        if 2 * count <= len(blocks) and count * len(frequencies) <= 64:
-            yield modulated(columns, range(count), target, used, blocks)
-
-
 def slow_candidates(target, used, lowest, floor_values):
     """Predictions of an offset that moves: each stretch from its neighbours, none from itself.
 
@@ -241,11 +245,11 @@ def slow_candidates(target, used, lowest, floor_values):
     """
     n = len(target)
     time = _correlation_time(floor_values, used)
-    counts = [_FEWEST, 2 * _FEWEST, _STRETCHES]
+    counts = [FEWEST, 2 * FEWEST, _STRETCHES]
     for count in counts:
-        if n / count < max(_TIMES * time, 16) or (count > _FEWEST and count / n > 2 * lowest):
-            if count == _FEWEST and n / count >= 4:
-                yield _from_neighbours(target, used, _FEWEST)
+        if n / count < max(_TIMES * time, 16) or (count > FEWEST and count / n > 2 * lowest):
+            if count == FEWEST and n / count >= 4:
+                yield _from_neighbours(target, used, FEWEST)
             return
         yield _from_neighbours(target, used, count)
 
@@ -260,7 +264,6 @@ def _correlation_time(values, used):
         if part.any():
             high[start:stop][part] -= high[start:stop][part].mean()
     spectrum = np.abs(rfft(high, next_fast_len(2 * n, real=True)))**2
-    from scipy.fft import irfft
     alike = irfft(spectrum, next_fast_len(2 * n, real=True))[:max(n // _STRETCHES, 2)]
     alike = alike / max(alike[0], 1e-300)
     ended = np.flatnonzero(alike < 0.1)
