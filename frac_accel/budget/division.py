@@ -42,6 +42,8 @@ _COURSES = (1, 2, 4, 8, 16)
 _BETTER = 1.0
 # Error of a fit to coloured noise, over that of one to white noise.
 _COLOURED = 4.0
+# Share of what a part is taken from that is worth a longer filter.
+_WORTH = 1e-4
 # A clipped prediction before anything is known of outliers.
 _CLIPPED = 5.0
 _STRETCHES = 10
@@ -260,6 +262,7 @@ class _One:
             target[self.flagged] = 0.0
             self.predicted.pop(part, None)
             made = self._best(part, target)
+            self.inputs, self.own = {}, {}
             if made is not None:
                 self.predicted[part], self.kept[part] = made
 
@@ -274,7 +277,7 @@ class _One:
         """
         judged = self.counted
         best = first = None
-        best_gain = np.zeros(len(self.r.blocks))
+        best_gain, left = np.zeros(len(self.r.blocks)), float(target @ target)
         worse = 0
         for place, (name, size, make) in enumerate(self._candidates(part, target)):
             if part in self.chosen and name != self.chosen[part]:
@@ -285,7 +288,7 @@ class _One:
                 first = name, predicted, size
             more = gains - best_gain
             error = np.sqrt(len(more)) * np.std(more)
-            if more.sum() > _BETTER * error and more.sum() > 0:
+            if more.sum() > max(_BETTER * error, _WORTH * left):
                 best, best_gain, worse = (name, predicted, size), gains, 0
             else:
                 worse += 1
@@ -449,8 +452,8 @@ class _One:
     def _error(self, target, predicted, size):
         """Power of a fit's own error, by which held-out data lose less than it explains.
 
-        Per sample. It is what the prediction has more than it shares with the target, but no more than a few
-        times what as many coefficients fit to noise.
+        Per sample. It is what the prediction has more than it shares with the target, but no more
+        than a few times what as many coefficients fit to noise.
         """
         counted = self.counted
         error = np.sum((predicted - target) * predicted)

@@ -3,13 +3,15 @@
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
-from scipy.signal import oaconvolve
+from scipy.signal import correlate, oaconvolve
 
 from .blocks import FOLDS
 
 # Ridges, of the products of inputs scaled to the same size: what the excitation hardly holds must
 # not be fitted to noise.
 _RIDGES = (1e-9, 1e-6, 1e-4, 1e-2)
+# Products up to which sums over shifts are formed one by one.
+_DIRECT = 500_000
 
 
 class Filters:
@@ -37,15 +39,13 @@ class Filters:
     def __init__(self, inputs, lags, blocks, used, step=1):
         self._step, self._all = step, used
         self._lags = lags
-        self._pad = max(max(-low, high) for low, high in lags) + 1
-        self._outputs = [np.pad(values[::step], self._pad) for values in inputs]
+        self._outputs = [values[::step] for values in inputs]
         if step > 1:
             blocks = blocks.thinned(step)
             inputs = [_thinned(values, step) for values in inputs]
             used = used[::step]
         self._blocks, self._used = blocks, used
-        self._inputs = [np.pad(values, self._pad) for values in inputs] if step > 1 \
-            else self._outputs
+        self._inputs = inputs
         self._guard = max(high - low for low, high in lags)
         self.size = sum(high - low + 1 for low, high in lags)
         # what lies before the record and after it is not known
@@ -56,7 +56,7 @@ class Filters:
         self._runs = [self._within(*blocks.guarded(block, self._guard))
                       for block in range(len(blocks))]
         whole = self._gram(*self._within(0, blocks.n))
-        self._grams = np.repeat(whole[None], FOLDS, axis=0)
+        self._whole, self._grams = whole, np.repeat(whole[None], FOLDS, axis=0)
         for block, run in enumerate(self._runs):
             self._grams[block % FOLDS] -= self._gram(*run)
 
@@ -85,30 +85,35 @@ class Filters:
         return self._predict(target, left_out)
 
     def _predict(self, target, left_out):
-        used, grams = self._used, self._grams
+        used, grams, unseen = self._used, self._grams, self._whole - self._grams
         if left_out is not None and left_out.any():
             used = used & ~left_out
-            grams = grams - self._products_of(np.flatnonzero(left_out & self._used))
+            total, by_fold = self._products_of(np.flatnonzero(left_out & self._used))
+            grams, unseen = grams - (total - by_fold), unseen - by_fold
         values = np.where(used, target, 0.0)
         whole = self._right(values, *self._within(0, len(values)))
         rights = np.repeat(whole[None], FOLDS, axis=0)
         for block, run in enumerate(self._runs):
             rights[block % FOLDS] -= self._right(values, *run)
-        judged = slice(self._first, self._last)
-        best, most = np.zeros(len(values)), 0.0
-        for ridge in _RIDGES:
-            result = self._held_out(grams, rights, ridge)
-            gain = float(np.sum(((2 * values - result) * result * used)[judged]))
-            if ridge == _RIDGES[0] or gain > most:
-                best, most = result, gain
+        best = self._held_out(self._best_weights(grams, unseen, rights, whole))
         for edge in (slice(0, self._first), slice(self._last, None)):
             if np.sum(((2 * values - best) * best * used)[edge]) < 0:
                 best[edge] = 0.0
         return best
 
-    def _held_out(self, grams, rights, ridge):
+    def _best_weights(self, grams, unseen, rights, whole):
+        """Weights of each fold, by the ridge that takes most from what they have not seen."""
+        best, most = None, -np.inf
+        for ridge in _RIDGES:
+            weights = [solve(gram, right, ridge) for gram, right in zip(grams, rights)]
+            gain = sum(2 * w @ (whole - right) - w @ other @ w
+                       for w, right, other in zip(weights, rights, unseen))
+            if gain > most:
+                best, most = weights, gain
+        return best
+
+    def _held_out(self, weights):
         """Each block's output of the filter that the others give."""
-        weights = [solve(gram, right, ridge) for gram, right in zip(grams, rights)]
         result = np.empty(self._blocks.n)
         for block, start, stop in self._blocks:
             result[start:stop] = self._output(weights[block % FOLDS], start, stop)
@@ -144,17 +149,21 @@ class Filters:
         return part
 
     def _run(self, values, start, stop):
-        """Padded input from one sample to another, both of the record's counting."""
-        return values[start + self._pad:stop + self._pad]
+        """Input from one sample to another; 0 beyond the record."""
+        before, after = max(-start, 0), max(stop - len(values), 0)
+        run = values[max(start, 0):stop]
+        return np.pad(run, (before, after)) if before or after else run
 
     def _shifts(self, values, span, at):
         """Values of an input at one sample, at all lags."""
-        return values[at - np.arange(span[0], span[1] + 1) + self._pad]
+        # within the record as far as it is used
+        return np.take(values, at - np.arange(span[0], span[1] + 1), mode="clip")
 
     def _shifted_sums(self, fixed, values, span, start, stop):
         """Sums of one run times an input at all lags."""
         moving = self._run(values, start - span[1], stop - span[0])
-        return np.correlate(moving, fixed, "valid")[::-1]
+        method = "fft" if len(fixed) * (span[1] - span[0] + 1) > _DIRECT else "direct"
+        return correlate(moving, fixed, "valid", method)[::-1]
 
     def _right(self, target, start, stop):
         if stop <= start:
@@ -168,20 +177,20 @@ class Filters:
         total = np.zeros((self.size, self.size))
         for some in np.array_split(rows, len(rows) // 4096 + 1):
             matrix = np.concatenate([
-                values[some[:, None] - np.arange(low, high + 1) + self._pad]
+                values[some[:, None] - np.arange(low, high + 1)]
                 for values, (low, high) in zip(self._inputs, self._lags)], axis=1)
             total += matrix.T @ matrix
         return total
 
     def _products_of(self, rows):
-        """Products over single samples, by fold that would learn from them."""
+        """Products over single samples: of all, and of those that each fold does not learn from."""
         rows = rows[(rows >= self._first) & (rows < self._last)]
-        result = np.repeat(self._outer(rows)[None], FOLDS, axis=0)
+        by_fold = np.zeros((FOLDS, self.size, self.size))
         for block, (start, stop) in enumerate(self._runs):
             here = rows[(rows >= start) & (rows < stop)]
             if len(here):
-                result[block % FOLDS] -= self._outer(here)
-        return result
+                by_fold[block % FOLDS] += self._outer(here)
+        return self._outer(rows), by_fold
 
     def _output(self, weights, start, stop):
         total, first = np.zeros(stop - start), 0

@@ -15,6 +15,8 @@ _FAR = 2.0
 # Ratio of the levels in loud and quiet stretches from which what is left follows the motion.
 _FOLLOWS = 1.5
 _STRETCHES = 20
+# Of the stretches at rest, the one whose scatter counts.
+_QUIETEST = 0.25
 
 
 @dataclasses.dataclass(frozen=True)
@@ -152,7 +154,7 @@ def _rest(measured, reference, used, rate):
 
     Where values on a lattice do not scatter at all, what rounding adds once they move.
     """
-    length = int(max(np.ceil(_REST_S * rate), _REST_SAMPLES)) if rate < 1e5 else _REST_SAMPLES
+    length = max(_REST_SAMPLES, min(int(np.ceil(_REST_S * rate)), len(measured) // _STRETCHES))
     count = len(measured) // length
     moving = reference - reference[used].mean(axis=0) if used.any() else reference
     whole = np.sqrt(np.sum(moving**2) / max(len(moving), 1))
@@ -169,8 +171,8 @@ def _rest(measured, reference, used, rate):
             found.append(np.sqrt(values @ values / (length - 2)))
     if not found:
         return None
-    # the sensor may still ring in the first of them
-    scatter = float(np.median(found))
+    # the sensor may still ring in some of them
+    scatter = float(np.quantile(found, _QUIETEST))
     step = _lattice(measured[used])
     if step and scatter < step / np.sqrt(12):
         scatter = float(step / np.sqrt(12))

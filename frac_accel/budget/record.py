@@ -54,7 +54,7 @@ def left_by(reference, sensor, model=None, axis="x", noise_std=None, second_sens
     ----------
     reference, sensor : Samples
     model : SensorModel, optional
-        Without it, the best static gain with a delay of whole samples.
+        Without it, the best static gain and offset with a delay of whole samples.
     axis : {"x", "y", "z"}
     noise_std : float, optional
         What the user states [output units].
@@ -144,7 +144,7 @@ def _simulated(pair, measured, model, axis, column, temperature_at):
         return values, "the given model"
     simulated, gain, shift = _static(pair.reference[:, column], measured, pair.valid)
     late = f", {abs(shift)} sample(s) {'later' if shift > 0 else 'earlier'}" if shift else ""
-    return simulated, f"the best static gain, {gain:.5g}{late} (no --model was given)"
+    return simulated, f"the best static gain, {gain:.5g}, and offset{late} (no --model was given)"
 
 
 def _between(values, place):
@@ -154,7 +154,7 @@ def _between(values, place):
 
 
 def _static(reference, measured, used):
-    """Reference times the gain that fits best, with or without whole samples of delay."""
+    """Reference times the gain that fits best, with an offset, maybe whole samples of delay."""
     best = None
     shift = bulk_shift(reference, measured, used) if np.ptp(reference[used]) else 0
     if abs(shift) > len(reference) // 4:
@@ -171,7 +171,7 @@ def _static(reference, measured, used):
         left = float(np.sum((y - gain * x)[used]**2))
         # a shift must be worth it
         if best is None or left < 0.99 * best[0]:
-            best = left, gain * moved, gain, samples
+            best = left, gain * moved + (measured - gain * moved)[used].mean(), gain, samples
     return best[1:]
 
 

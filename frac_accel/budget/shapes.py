@@ -3,7 +3,7 @@
 import numpy as np
 
 # Velocity, of its RMS, at which a smooth sign has turned.
-_TURN = 0.1
+_TURN = 0.02
 # Lags at which what a filter would take is taken out of a shape.
 _LAGS = (-2, 2)
 

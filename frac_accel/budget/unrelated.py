@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
+from scipy.stats import gamma
 
 # From median absolute value to the standard deviation of normal noise.
 _NORMAL = 1.4826
@@ -20,8 +21,8 @@ _LEVEL_SAMPLES = 50
 _PARTS = 20
 # Scale, of the residual's RMS, below which no scatter is believed (values on a lattice).
 _LEAST = 1e-3
-# Standard deviations of a mean rank by which bursts are likelier where much moves.
-_RELATED = 4.0
+# Probability of as many bursts where much moves, below which it is no chance.
+_RELATED = 0.005
 
 # Tones at most, bins of the spectrum whose median is the floor, and what the highest of n bins of
 # noise exceeds its mean by more than ln n in 6 of a million records.
@@ -108,18 +109,25 @@ def bursts(values, motion, used):
             spread = _NORMAL * np.median(np.abs(usual - middle))
             most = np.exp(middle + max(np.log(_POWER), _STANDS_OUT * spread))
             strong = power > most
-            found |= used & (uniform_filter1d(strong.astype(float), _WINDOW) > 0) \
-                & (size > np.sqrt(_POWER) / 2)
+            # to the ends of a burst: half of a window beyond its middle
+            found |= used & (uniform_filter1d(strong.astype(float), _WINDOW // 2) > 1e-9)
     count = int(found.sum())
     if not count or count > _SHORT * used.sum():
         return np.zeros(len(values), bool)
+    return np.zeros(len(values), bool) if _where_much_moves(found, motion, used) else found
+
+
+def _where_much_moves(found, motion, used):
+    """Whether samples lie where much moves more often than chance would have it.
+
+    By Fisher's sum of the logarithms of the ranks from above, one of each group.
+    """
     envelope = _envelope(motion)
-    rank = np.searchsorted(np.sort(envelope[used]), envelope[found]) / used.sum()
     rows = np.flatnonzero(found)
-    groups = 1 + int(np.sum(np.diff(rows) > _WINDOW))
-    if np.mean(rank) > 0.5 + _RELATED * np.sqrt(1 / 12 / groups):
-        return np.zeros(len(values), bool)
-    return found
+    groups = np.split(rows, np.flatnonzero(np.diff(rows) > _WINDOW) + 1)
+    middle = np.array([np.median(envelope[group]) for group in groups])
+    above = 1 - np.searchsorted(np.sort(envelope[used]), middle) / (used.sum() + 1)
+    return bool(gamma.sf(-np.sum(np.log(above)), len(groups)) < _RELATED)
 
 
 def _envelope(motion):
@@ -136,11 +144,11 @@ def spectrum_peaks(values):
     power = np.abs(rfft(values * np.hanning(n)))**2
     size = min(_FLOOR_BINS, max(8, len(power) // 8))
     count = max(1, len(power) // size)
-    edges = np.linspace(0, len(power), count + 1).astype(int)
+    size = min(size, len(power))
+    rows = power[:count * size].reshape(count, size)
     # exponentially distributed power: median to mean
-    floor = [np.log(np.median(power[a:b]) / np.log(2) + 1e-300)
-             for a, b in zip(edges[:-1], edges[1:])]
-    floor = np.exp(np.interp(np.arange(len(power)), (edges[:-1] + edges[1:]) / 2, floor))
+    floor = np.log(np.median(rows, axis=1) / np.log(2) + 1e-300)
+    floor = np.exp(np.interp(np.arange(len(power)), (np.arange(count) + 0.5) * size, floor))
     ratio = power / np.maximum(floor, 1e-300 + 1e-24 * power.max())
     high = np.flatnonzero((ratio[1:-1] > np.log(n) + _CHANCE) & (power[1:-1] > power[:-2])
                           & (power[1:-1] >= power[2:])) + 1

@@ -22,8 +22,8 @@ def add_arguments(parser):
     """Options of the verb."""
     add_bag(parser)
     parser.add_argument("--model", metavar="M.yaml",
-                        help="model in use (default: the best static gain, with a delay of whole "
-                             "samples)")
+                        help="model in use (default: the best static gain and offset, with a delay "
+                             "of whole samples)")
     add_topics(parser)
     parser.add_argument("--second-sensor", metavar="TOPIC",
                         help="another sensor on the same body: what both share is the reference's "
@@ -64,7 +64,8 @@ def table(left, axis):
              f"output's {budget.output_rms:.4g}" if whole > 1 else
              f"axis {axis}: {left.model}, leaves {budget.rms:.4g} RMS, {whole:.2%} of the output"]
     if budget.parts:
-        lines.append(f"{'part':13}{'of what is left':>16}{'95 % interval':>18}{'of the output':>15}")
+        lines.append(f"{'part':13}{'of what is left':>16}{'95 % interval':>18}"
+                     f"{'of the output':>15}")
     for entry in sorted(budget.parts, key=lambda entry: -entry["share"]):
         low, high = entry["ci95"]
         lines.append(f"{entry['part']:13}{entry['share']:>16.1%}"
