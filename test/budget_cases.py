@@ -7,7 +7,7 @@ KINDS = ("linear", "across", "even", "odd", "time_varying", "lines", "bursts", "
 
 
 def excitation(rng, n, axes=3):
-    """Band noise of a random band on each axis, shape (n, axes), and a sensor's output of axis 0."""
+    """Band noise on each axis, shape (n, axes), and a sensor's output of the first."""
     low, high = rng.uniform(0.005, 0.03), rng.uniform(0.1, 0.7)
     sos = sig.butter(4, [low, high], "bandpass", output="sos")
     reference = sig.sosfilt(sos, rng.normal(size=(n + 500, axes)), axis=0)

@@ -1,6 +1,7 @@
 """The error budget: what is left of a sensor's signal, parted by kind."""
 
 import dataclasses
+import functools
 
 import numpy as np
 from scipy.fft import rfft
@@ -9,7 +10,7 @@ from ..identification.recognise import recognise
 from . import repeats, shapes, unrelated
 from .blocks import FOLDS, Blocks, intervals
 from .filters import Filters
-from .modulated import modulated
+from .modulated import Modulated
 
 # In the order in which they are taken from the residual.
 PARTS = ("bursts", "lines", "linear", "across", "even", "odd", "time_varying", "slow", "distortion",
@@ -253,7 +254,7 @@ class _One:
 
     def _pass(self):
         """Each part from what the others leave, in their order."""
-        self.inputs, self.own, self.output = {}, {}, None
+        self.again = dict(self.predicted)
         for part in PARTS[1:-2]:
             # what repeats contains every other part of a repeated motion
             others = [values for name, values in self.predicted.items()
@@ -262,7 +263,6 @@ class _One:
             target[self.flagged] = 0.0
             self.predicted.pop(part, None)
             made = self._best(part, target)
-            self.inputs, self.own = {}, {}
             if made is not None:
                 self.predicted[part], self.kept[part] = made
 
@@ -312,12 +312,12 @@ class _One:
             rest = np.where(self.counted, target, 0.0)
             self.frequencies = unrelated.tones(rest, r.ratio, r.tones, r.period, self.counted)
         if len(self.frequencies):
+            waves = Modulated(unrelated.tone_waves(self.frequencies), target, self.counted,
+                              r.blocks)
             for count, orders in enumerate(unrelated.LINE_COURSES):
                 if 2 * orders <= len(r.blocks):
                     size = 2 * orders * len(self.frequencies)
-                    yield count, size, lambda orders=orders: modulated(
-                        unrelated.tone_waves(self.frequencies), range(orders), target,
-                        self.counted, r.blocks)
+                    yield count, size, lambda orders=orders: waves.predict(range(orders))
 
     def _linear_candidates(self, target):
         r = self.r
@@ -331,16 +331,9 @@ class _One:
             if np.ptp(self.simulated[r.used]) else 1.0
         length = ((-1, 2), (-4, 8))
         if abs(alike) < 0.9999 and r.fits(17, 13, self.step):
-            yield "both", 17, lambda: self._own_filters(
-                "linear", [r.x, shapes.standardised(self.simulated, r.used)], length).predict(
-                    target, self.flagged)
-
-    def _own_filters(self, key, inputs, lags):
-        """Filters of this model's own inputs, kept for one pass."""
-        key = key, tuple(lags)
-        if key not in self.own:
-            self.own[key] = Filters(inputs, lags, self.r.blocks, self.r.used, self.step)
-        return self.own[key]
+            yield "both", 17, lambda: Filters(
+                [r.x, shapes.standardised(self.simulated, r.used)], length, r.blocks, r.used,
+                self.step).predict(target, self.flagged)
 
     def _across_candidates(self, target):
         r = self.r
@@ -365,31 +358,33 @@ class _One:
         r = self.r
         if not r.moves:
             return
-        inputs = self.inputs
-        if part not in inputs:
-            inputs[part] = make(self._output(), r.used)
-        trials = [(count, length) for length in _SHAPE_LENGTHS for count in (1, len(inputs[part]))]
-        for count, length in (*trials, _RINGING):
-            size, span = _span(length)
-            if r.fits(count * size, span, self.step):
-                yield (count, length), count * size, lambda count=count, length=length: (
-                    self._own_filters(part, inputs[part][:count], [length] * count).predict(
-                        target, self.flagged))
+        # what follows the output with its distortion; or, where that is rough, without
+        for output in self._outputs():
+            inputs = make(output, r.used)
+            trials = [(count, length) for length in _SHAPE_LENGTHS for count in (1, len(inputs))]
+            for count, length in (*trials, _RINGING):
+                size, span = _span(length)
+                if r.fits(count * size, span, self.step):
+                    yield (count, length), count * size, functools.partial(
+                        self._filtered, inputs[:count], length, target)
 
-    def _output(self):
-        """The output as the parts found so far have it: what a spring's force follows."""
-        if self.output is None:
-            self.output = self.simulated + sum(
-                self.predicted.get(part, 0.0) for part in ("linear", "even", "odd"))
-            if not np.ptp(self.output):
-                self.output = self.r.x
-        return self.output
+    def _filtered(self, inputs, length, target):
+        return Filters(inputs, [length] * len(inputs), self.r.blocks, self.r.used,
+                       self.step).predict(target, self.flagged)
+
+    def _outputs(self):
+        """The output as the linear part has it and, in the second pass, with its distortion."""
+        linear = self.simulated + self.predicted.get("linear", 0.0)
+        if not np.ptp(linear):
+            linear = self.r.x
+        more = sum((self.again.get(part, 0.0) for part in ("even", "odd")), np.zeros(self.r.n))
+        return [linear, linear + more] if more.any() else [linear]
 
     def _time_varying_candidates(self, target):
         r = self.r
         if not r.moves:
             return
-        y = shapes.standardised(self._output(), r.used)
+        y = shapes.standardised(self._outputs()[0], r.used)
         v = shapes.standardised(np.gradient(y), r.used)
         bases = [y, v, shapes.standardised(np.gradient(v), r.used)]
         if abs(np.corrcoef(y[r.used], r.x[r.used])[0, 1]) < 0.999:
@@ -397,10 +392,11 @@ class _One:
 
         def columns(start, stop):
             return np.stack([base[start:stop] for base in bases], axis=1)
+        waves = Modulated(columns, target, self.counted, r.blocks)
         for count in _COURSES:
             if count * len(bases) * _SAMPLES <= r.used.sum() and 2 * count <= len(r.blocks):
-                yield count, count * len(bases), lambda count=count: modulated(
-                    columns, range(1, count + 1), target, self.counted, r.blocks)
+                yield count, count * len(bases), lambda count=count: waves.predict(
+                    range(1, count + 1))
 
     def _slow_candidates(self, target):
         for count, values in enumerate(unrelated.slow_candidates(

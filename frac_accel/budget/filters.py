@@ -3,15 +3,15 @@
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
-from scipy.signal import correlate, oaconvolve
+from scipy.signal import oaconvolve
 
 from .blocks import FOLDS
 
 # Ridges, of the products of inputs scaled to the same size: what the excitation hardly holds must
 # not be fitted to noise.
 _RIDGES = (1e-9, 1e-6, 1e-4, 1e-2)
-# Products up to which sums over shifts are formed one by one.
-_DIRECT = 500_000
+# Samples that are enough to learn from: of longer records, the first part of each block.
+_ENOUGH = 150_000
 
 
 class Filters:
@@ -53,12 +53,18 @@ class Filters:
         self._last = blocks.n + min(0, *(low for low, _ in lags))
         # long filters need long blocks between their guards
         self._blocks = blocks = blocks.coarser(2 * self._guard)
+        self._learnt = [self._within(0, blocks.n)]
         self._runs = [self._within(*blocks.guarded(block, self._guard))
                       for block in range(len(blocks))]
-        whole = self._gram(*self._within(0, blocks.n))
-        self._whole, self._grams = whole, np.repeat(whole[None], FOLDS, axis=0)
+        if blocks.n > _ENOUGH:
+            share = _ENOUGH / blocks.n
+            self._learnt = self._runs = [self._within(start, start + int(share * (stop - start)))
+                                         for _, start, stop in blocks]
+        self._unseen = np.zeros((FOLDS, self.size, self.size))
         for block, run in enumerate(self._runs):
-            self._grams[block % FOLDS] -= self._gram(*run)
+            self._unseen[block % FOLDS] += self._gram(*run)
+        self._whole = self._unseen.sum(axis=0) if self._learnt is self._runs \
+            else self._gram(*self._learnt[0])
 
     def _within(self, start, stop):
         return min(max(start, self._first), self._last), max(min(stop, self._last), self._first)
@@ -85,31 +91,34 @@ class Filters:
         return self._predict(target, left_out)
 
     def _predict(self, target, left_out):
-        used, grams, unseen = self._used, self._grams, self._whole - self._grams
+        used, gram, unseen = self._used, self._whole, self._unseen
         if left_out is not None and left_out.any():
             used = used & ~left_out
             total, by_fold = self._products_of(np.flatnonzero(left_out & self._used))
-            grams, unseen = grams - (total - by_fold), unseen - by_fold
+            gram, unseen = gram - total, unseen - by_fold
         values = np.where(used, target, 0.0)
-        whole = self._right(values, *self._within(0, len(values)))
-        rights = np.repeat(whole[None], FOLDS, axis=0)
+        judged = np.zeros((FOLDS, self.size))
         for block, run in enumerate(self._runs):
-            rights[block % FOLDS] -= self._right(values, *run)
-        best = self._held_out(self._best_weights(grams, unseen, rights, whole))
+            judged[block % FOLDS] += self._right(values, *run)
+        whole = judged.sum(axis=0) if self._learnt is self._runs \
+            else self._right(values, *self._learnt[0])
+        best = self._held_out(self._best_weights(gram, unseen, whole, judged))
         for edge in (slice(0, self._first), slice(self._last, None)):
             if np.sum(((2 * values - best) * best * used)[edge]) < 0:
                 best[edge] = 0.0
         return best
 
-    def _best_weights(self, grams, unseen, rights, whole):
+    def _best_weights(self, gram, unseen, whole, judged):
         """Weights of each fold, by the ridge that takes most from what they have not seen."""
         best, most = None, -np.inf
         for ridge in _RIDGES:
-            weights = [solve(gram, right, ridge) for gram, right in zip(grams, rights)]
-            gain = sum(2 * w @ (whole - right) - w @ other @ w
-                       for w, right, other in zip(weights, rights, unseen))
-            if gain > most:
-                best, most = weights, gain
+            weights = [solve(gram - other, whole - right, ridge)
+                       for other, right in zip(unseen, judged)]
+            gain = sum(2 * w @ right - w @ other @ w
+                       for w, right, other in zip(weights, judged, unseen))
+            if gain <= most:
+                break
+            best, most = weights, gain
         return best
 
     def _held_out(self, weights):
@@ -162,8 +171,7 @@ class Filters:
     def _shifted_sums(self, fixed, values, span, start, stop):
         """Sums of one run times an input at all lags."""
         moving = self._run(values, start - span[1], stop - span[0])
-        method = "fft" if len(fixed) * (span[1] - span[0] + 1) > _DIRECT else "direct"
-        return correlate(moving, fixed, "valid", method)[::-1]
+        return np.correlate(moving, fixed, "valid")[::-1]
 
     def _right(self, target, start, stop):
         if stop <= start:
@@ -184,13 +192,16 @@ class Filters:
 
     def _products_of(self, rows):
         """Products over single samples: of all, and of those that each fold does not learn from."""
-        rows = rows[(rows >= self._first) & (rows < self._last)]
-        by_fold = np.zeros((FOLDS, self.size, self.size))
+        by_fold, total = np.zeros((FOLDS, self.size, self.size)), 0.0
         for block, (start, stop) in enumerate(self._runs):
             here = rows[(rows >= start) & (rows < stop)]
             if len(here):
                 by_fold[block % FOLDS] += self._outer(here)
-        return self._outer(rows), by_fold
+        if self._learnt is self._runs:
+            return by_fold.sum(axis=0), by_fold
+        for start, stop in self._learnt:
+            total = total + self._outer(rows[(rows >= start) & (rows < stop)])
+        return total, by_fold
 
     def _output(self, weights, start, stop):
         total, first = np.zeros(stop - start), 0

@@ -6,6 +6,8 @@ import numpy as np
 _TURN = 0.02
 # Lags at which what a filter would take is taken out of a shape.
 _LAGS = (-2, 2)
+# Samples that are enough to tell what.
+_ENOUGH = 100_000
 
 
 def standardised(values, used):
@@ -41,12 +43,14 @@ def _cleared(shapes, y, used):
     padded = np.pad(y, max(-_LAGS[0], _LAGS[1]))
     lags = range(_LAGS[0], _LAGS[1] + 1)
     columns = [padded[_LAGS[1] - k:_LAGS[1] - k + n] for k in lags]
-    gram = np.array([[a[used] @ b[used] for b in columns] for a in columns])
+    some = np.flatnonzero(used)[::max(1, n // _ENOUGH)]
+    matrix = np.stack([column[some] for column in columns], axis=1)
+    gram = matrix.T @ matrix
     gram[np.diag_indices_from(gram)] += 1e-9 * np.trace(gram)
     result = []
     for shape in shapes:
         shape = shape - shape[used].mean()
-        weights = np.linalg.solve(gram, [column[used] @ shape[used] for column in columns])
+        weights = np.linalg.solve(gram, matrix.T @ shape[some])
         for weight, column in zip(weights, columns):
             shape -= weight * column
         result.append(standardised(shape, used))
