@@ -47,6 +47,10 @@ _COLOURED = 4.0
 _WORTH = 1e-4
 # A clipped prediction before anything is known of outliers.
 _CLIPPED = 5.0
+# Samples at both ends in which no burst is looked for.
+_ENDS = 128
+# Share of the samples that must stay when the ends are not judged.
+_STAYS = 0.7
 _STRETCHES = 10
 _OCTAVES = 6
 # Energy of the reference below which lies what counts as slower than it, and that of a tone's
@@ -200,6 +204,7 @@ class _One:
         self.measured = np.asarray(measured, float)
         self.simulated = np.asarray(simulated, float)
         self.flagged = np.zeros(record.n, bool)
+        self.inside = np.ones(record.n, bool)
         self.step = self._step()
         self.predicted, self.kept, self.chosen, self.sizes = {}, {}, {}, {}
 
@@ -222,6 +227,7 @@ class _One:
         self.predicted["slow"] = np.full(r.n, np.median(self.e[r.used]))
         self._bursts_first()
         self._pass()
+        self._leave_out_ends()
         self._find_bursts(self.e - sum(self.predicted.values()))
         self._pass()
         return self._summed(power)
@@ -241,8 +247,22 @@ class _One:
                 predicted = np.zeros(r.n)
         self._find_bursts(moving - predicted)
 
+    def _leave_out_ends(self):
+        """Do not judge where the filter found would have to know what lies beyond the record."""
+        length = self.chosen.get("linear")
+        if not isinstance(length, tuple):
+            return
+        low, high = (lag * self.step for lag in length)
+        inside = np.zeros(self.r.n, bool)
+        inside[max(high, 0):self.r.n + min(low, 0)] = True
+        if np.sum(inside & self.r.used) > _STAYS * self.r.used.sum():
+            self.inside = inside
+
     def _find_bursts(self, rest):
-        self.flagged = unrelated.bursts(rest, self._motion(), self.r.used)
+        found = unrelated.bursts(rest, self._motion(), self.r.used)
+        # what lies before the record and after it rings on in it
+        found[:_ENDS] = found[-_ENDS:] = False
+        self.flagged = found & self.inside
 
     def _motion(self):
         return self.simulated if np.ptp(self.simulated) else self.r.x
@@ -268,7 +288,7 @@ class _One:
 
     @property
     def counted(self):
-        return self.r.used & ~self.flagged
+        return self.r.used & ~self.flagged & self.inside
 
     def _best(self, part, target):
         """Prediction of the simplest candidate that no other clearly beats.
@@ -489,7 +509,8 @@ class _One:
             bounds[:, 0] = np.minimum(bounds[:, 0], shares)
             bounds[:, 1] = np.maximum(bounds[:, 1], shares)
             left = self.r.blocks.sums(weights).sum()
-            band_rest = _band_power(self.e, self.e, edges, r.rate) / left
+            judged = np.where(self.inside, self.e, 0.0)
+            band_rest = _band_power(judged, judged, edges, r.rate) / left
             time_rest = np.add.reduceat(weights, stretches[:-1]) / left
             for name, rows in merged.items():
                 in_bands[name] = sum(_band_power(*spectra[i], edges, r.rate) for i in rows) / left
