@@ -39,8 +39,10 @@ _SAMPLES = 10
 _MOVES = 1e-10
 # Orders of the courses of slowly changing weights.
 _COURSES = (1, 2, 4, 8, 16)
-# Standard errors by which a longer filter must take more of the judged blocks.
+# Standard errors by which a longer filter must take more of the judged blocks, and by which the
+# first must take any.
 _BETTER = 1.0
+_ANY = 2.0
 # Error of a fit to coloured noise, over that of one to white noise.
 _COLOURED = 4.0
 # Share of what a part is taken from that is worth a longer filter.
@@ -308,7 +310,7 @@ class _One:
                 first = name, predicted, size
             more = gains - best_gain
             error = np.sqrt(len(more)) * np.std(more)
-            if more.sum() > max(_BETTER * error, _WORTH * left):
+            if more.sum() > max((_BETTER if best else _ANY) * error, _WORTH * left):
                 best, best_gain, worse = (name, predicted, size), gains, 0
             else:
                 worse += 1
