@@ -7,10 +7,10 @@ import pytest
 import real_records
 from budget_cases import excitation
 
-from frac_accel import Samples, write_bag
-from frac_accel.bag import RAW_TOPIC, REFERENCE_TOPIC
+from frac_accel.bag import RAW_TOPIC, REFERENCE_TOPIC, write_bag
 from frac_accel.budget import PARTS
 from frac_accel.cli import main
+from frac_accel.samples import Samples
 
 REAL = pytest.mark.skipif(not real_records.FOLDER.is_dir(),
                           reason="the records in ../shared/data are not here")
