@@ -41,7 +41,8 @@ def result(tmp_path, bag, *options):
 
 def test_result_file(tmp_path, capsys):
     found = result(tmp_path, written(tmp_path / "a.mcap"))
-    assert found["model"].startswith("the best static gain, 0.9")
+    words, gain, *_ = found["model"].split(", ")
+    assert words == "the best static gain" and float(gain) == pytest.approx(0.9, abs=2e-3)
     assert {entry["part"] for entry in found["budget"]} <= set(PARTS)
     for entry in found["budget"]:
         low, high = entry["ci95"]
@@ -91,7 +92,8 @@ def independent_correlation(bag):
         predicted = np.where(first, *(columns @ np.linalg.lstsq(
             columns[rows], y[rows], rcond=None)[0] for rows in (~first, first)))
         left.append(y - predicted)
-    return np.corrcoef(*left)[0, 1]
+    # rolled ends are no data
+    return np.corrcoef(*(values[20:-20] for values in left))[0, 1]
 
 
 @REAL
@@ -103,9 +105,11 @@ def test_two_phones_share_what_an_independent_fit_says(tmp_path, test):
     parts = {entry["part"]: entry for entry in found["budget"]}
     # of what is neither linear nor otherwise explained, as the independent fit counts it
     rest = parts["reference"]["share"] + parts["noise"]["share"]
-    assert parts["reference"]["share"] / rest == pytest.approx(
-        independent_correlation(bag), abs=0.06)
-    assert parts["reference"]["ci95"][1] > 0.05
+    low, high = (bound / rest for bound in parts["reference"]["ci95"])
+    other = independent_correlation(bag)
+    assert 0.15 < other < 0.35
+    assert low < other < high
+    assert parts["reference"]["share"] / rest == pytest.approx(other, abs=0.1)
     assert found["established_noise"]["by"] is None
 
 

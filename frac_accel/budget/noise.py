@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from scipy.stats import spearmanr
 
 from ..identification.recognise import recognise
 
@@ -12,8 +13,12 @@ _REST_S = 0.5
 _REST_SAMPLES = 200
 # Factor by which a covariance may differ from the scatter at rest.
 _FAR = 2.0
-# Ratio of the levels in loud and quiet stretches from which what is left follows the motion.
-_FOLLOWS = 1.5
+# Ratio of the motion in loud and quiet stretches that is needed to tell noise from what follows the
+# motion, the ratio of what is left from which it does, and the chance of as high a correlation of
+# ranks.
+_DIFFER = 2.0
+_FOLLOWS = 1.2
+_CHANCE = 0.1
 _STRETCHES = 20
 # Of the stretches at rest, the one whose scatter counts.
 _QUIETEST = 0.25
@@ -93,8 +98,8 @@ def established_noise(residual, measured, reference, used, sampling_rate_hz, cov
     if other_sensor_residual is not None:
         rms = _unshared(residual, other_sensor_residual, used)
         if _follows(residual, moving, used):
-            words.append("what the second sensor does not share follows the motion: it is not all "
-                         "noise")
+            words.append("what the second sensor does not share follows the motion, or nothing "
+                         "shows that it does not: it need not be noise")
         elif rms is not None:
             return EstablishedNoise(rms, "second_sensor", words)
     return EstablishedNoise(None, None, words)
@@ -214,11 +219,15 @@ def _unshared(residual, other, used):
 
 
 def _follows(residual, moving, used):
-    """Whether what is left is larger where more moves."""
+    """Whether what is left is larger where more moves, or nothing shows that it is not."""
     edges = np.linspace(0, len(residual), _STRETCHES + 1).astype(int)[:-1]
     count = np.maximum(np.add.reduceat(used.astype(float), edges), 1)
     left = np.sqrt(np.add.reduceat(residual**2 * used, edges) / count)
-    level = np.add.reduceat((moving - moving[used].mean())**2 * used, edges) / count
+    level = np.sqrt(np.add.reduceat((moving - moving[used].mean())**2 * used, edges) / count)
     order = np.argsort(level)
-    half = _STRETCHES // 2
-    return bool(np.median(left[order[half:]]) > _FOLLOWS * np.median(left[order[:half]]))
+    quiet, loud = order[:_STRETCHES // 2], order[_STRETCHES // 2:]
+    if np.median(level[loud]) < _DIFFER * np.median(level[quiet]):
+        return True
+    alike = spearmanr(left, level)
+    return bool(np.median(left[loud]) > _FOLLOWS * np.median(left[quiet])
+                or (alike.statistic > 0 and alike.pvalue < _CHANCE))
