@@ -15,6 +15,7 @@ VERBS = {
     "identify": "measured pair -> sensor model with standard uncertainties",
     "validate": "error metrics of a model and of its correction",
     "correct": "raw acceleration -> corrected acceleration",
+    "budget": "what is left, parted by kind, in seconds, without naming anything",
     "diagnose": "what a simulation gets wrong, the cause, the extension, the gain",
     "paper": "the seed paper's tables and figures again, and the audit of its claims",
     "bench": "speed, latency and memory, beside peers in the same run",

@@ -1,0 +1,546 @@
+"""The error budget: what is left of a sensor's signal, parted by kind."""
+
+import dataclasses
+import functools
+
+import numpy as np
+from scipy.fft import rfft
+
+from ..identification.recognise import recognise
+from . import repeats, shapes, unrelated
+from .blocks import FOLDS, Blocks, intervals
+from .filters import Filters
+from .modulated import Modulated
+
+# In the order in which they are taken from the residual.
+PARTS = ("bursts", "lines", "linear", "across", "even", "odd", "time_varying", "slow", "distortion",
+         "reference", "noise")
+WORDS = {
+    "linear": "a linear filter of this axis would take it",
+    "across": "a linear filter of the other axes would take it",
+    "even": "nonlinear, the same for both directions",
+    "odd": "nonlinear, turns its sign with the motion",
+    "time_varying": "gain or timing changes along the record",
+    "lines": "tones that the reference does not have",
+    "bursts": "short and strong, unrelated to the motion",
+    "slow": "the offset, and its drift and steps",
+    "distortion": "repeats with the excitation's period, so no noise",
+    "reference": "shared with the second sensor: reference or fixture",
+    "noise": "nothing in the record predicts it"}
+# Lags [samples] of the filters that are tried: ahead, behind.
+_LENGTHS = ((0, 0), (-1, 2), (-4, 8), (-12, 24), (-32, 96), (-64, 448), (-64, 960))
+_ALWAYS = 5
+_SHAPE_LENGTHS = ((0, 0), (-1, 2), (-4, 12))
+# A filter of the likeliest shapes that may ring as the sensor does.
+_RINGING = (2, (-16, 112))
+# Counted samples for each coefficient.
+_SAMPLES = 10
+# Power of an axis, of the strongest one's, from which it moves.
+_MOVES = 1e-10
+# Orders of the courses of slowly changing weights.
+_COURSES = (1, 2, 4, 8, 16)
+# Standard errors by which a longer filter must take more of the judged blocks, and by which the
+# first must take any.
+_BETTER = 1.0
+_ANY = 2.0
+# Error of a fit to coloured noise, over that of one to white noise.
+_COLOURED = 4.0
+# Share of what a part is taken from that is worth a longer filter.
+_WORTH = 1e-4
+# A clipped prediction before anything is known of outliers.
+_CLIPPED = 5.0
+# Samples at both ends in which no burst is looked for.
+_ENDS = 128
+# Share of the samples that must stay when the ends are not judged.
+_STAYS = 0.7
+_STRETCHES = 10
+_OCTAVES = 6
+# Energy of the reference below which lies what counts as slower than it, and that of a tone's
+# peaks from which the reference is made of tones.
+_LOWEST = 0.01
+# Energy below which all of the reference's band lies, samples of its fastest cycle that are enough
+# for a filter of it and its harmonics, and samples that must stay.
+_HIGHEST = 0.995
+_FASTER = 8
+_FEWEST = 1000
+
+
+@dataclasses.dataclass(frozen=True)
+class Budget:
+    """Parts of a residual.
+
+    Attributes
+    ----------
+    parts : list of dict
+        ``part``, ``share`` of the residual's power, ``ci95``, and ``of_output``, the RMS of the
+        part over the standard deviation of the sensor's signal. The shares add up to 1.
+    rms, output_rms : float
+        Of the residual, and standard deviation of the measured signal [output units].
+    band_edges_hz : ndarray, shape (bands + 1,)
+    in_bands : dict of str to ndarray, shape (bands,)
+        Power of each part in each band, of the residual's whole power.
+    stretch_edges_s : ndarray, shape (11,)
+    along : dict of str to ndarray, shape (10,)
+        Power of each part in each stretch of the record, of the residual's whole power.
+    """
+
+    parts: list
+    rms: float
+    output_rms: float
+    band_edges_hz: np.ndarray
+    in_bands: dict
+    stretch_edges_s: np.ndarray
+    along: dict
+
+    def share(self, part):
+        """Share of one part; 0 where it was not looked for."""
+        return next((entry["share"] for entry in self.parts if entry["part"] == part), 0.0)
+
+    def as_list(self, of=None):
+        """As a result file has it: part, share and ci95, and of which model."""
+        return [{"part": entry["part"], **({"of": of} if of else {}), "share": entry["share"],
+                 "ci95": entry["ci95"]} for entry in self.parts]
+
+    def picture(self):
+        """Bands and stretches as plain numbers, for a report."""
+        return {"band_edges_hz": self.band_edges_hz.tolist(),
+                "in_bands": {part: values.tolist() for part, values in self.in_bands.items()},
+                "stretch_edges_s": self.stretch_edges_s.tolist(),
+                "along": {part: values.tolist() for part, values in self.along.items()}}
+
+
+def error_budget(residual, measured, simulated, reference, used, sampling_rate_hz, axis,
+                 other_sensor_residual=None):
+    """Part what a model leaves of a sensor's signal; see `Division`."""
+    return Division(reference, used, sampling_rate_hz, axis).of(
+        residual, measured, simulated, other_sensor_residual)
+
+
+class Division:
+    """Error budgets of several models on one record; what hangs on the record only is kept.
+
+    Parameters
+    ----------
+    reference : ndarray, shape (n, 3)
+        Acceleration [m/s²] at uniform instants, finite.
+    used : ndarray of bool, shape (n,)
+        False where a sample does not count.
+    sampling_rate_hz : float
+    axis : {0, 1, 2}
+    """
+
+    def __init__(self, reference, used, sampling_rate_hz, axis):
+        self.used = np.asarray(used, bool)
+        if not self.used.any():
+            self.used = np.ones(len(self.used), bool)
+        self.rate = float(sampling_rate_hz)
+        power = np.var(reference[self.used], axis=0)
+        # an offset and gravity's share of a gain cannot be told apart: the mean is no excitation
+        self.axes = [np.ascontiguousarray(reference[:, i] - reference[self.used, i].mean())
+                     for i in (axis, *(i for i in range(3) if i != axis))
+                     if power[i] > _MOVES * power.max() or i == axis]
+        self.moves = bool(power[axis] > 0)
+        self.x = self.axes[0]
+        self.n = len(self.x)
+        self.blocks = Blocks.of(self.x)
+        self._filters = {}
+        self._period = None
+        energy = np.cumsum(np.abs(rfft(self.x * np.hanning(self.n)))**2)
+        self.lowest = max(np.searchsorted(energy, _LOWEST * energy[-1]), 1) / self.n
+        self._lines_of_reference()
+
+    @property
+    def period(self):
+        """Samples after which the reference repeats; 0 where it does not."""
+        if self._period is None:
+            self._period = recognise(self.x, self.rate).period_samples if self.moves \
+                and self.n >= 64 else 0
+        return self._period
+
+    def of(self, residual, measured, simulated, other_sensor_residual=None):
+        """Budget of one model.
+
+        Parameters
+        ----------
+        residual, measured, simulated : ndarray, shape (n,)
+            Measured less simulated, and both [output units].
+        other_sensor_residual : ndarray, shape (n,), optional
+            Residual of a second sensor on the same body against the same reference, at the same
+            instants, divided by its gain and multiplied by this sensor's.
+
+        Returns
+        -------
+        Budget
+        """
+        return _One(self, np.where(self.used, residual, 0.0), measured, simulated,
+                    other_sensor_residual).budget()
+
+    def _lines_of_reference(self):
+        """Its spectrum over its floor, and its tones where it has few."""
+        self.ratio, self.tones = np.zeros(self.n // 2 + 1), np.empty(0)
+        for values in self.axes:
+            if not values.any():
+                continue
+            place, _, ratio = unrelated.spectrum_peaks(values)
+            self.ratio = np.maximum(self.ratio, ratio)
+            if len(place) <= unrelated.FEW_TONES:
+                self.tones = np.r_[self.tones, place / self.n]
+
+    def fits(self, coefficients, span, step):
+        """Whether the record is long enough for a filter."""
+        return coefficients * _SAMPLES * step <= self.used.sum() and (
+            span <= 1 or 2 * span * step <= self.blocks.shortest * len(self.blocks) / FOLDS)
+
+    def filters(self, key, make):
+        """Filters of the reference, kept for the next budget."""
+        if key not in self._filters:
+            self._filters[key] = make()
+        return self._filters[key]
+
+
+class _One:
+    """One budget in the making."""
+
+    def __init__(self, record, residual, measured, simulated, other):
+        self.r, self.e, self.other = record, residual, other
+        self.measured = np.asarray(measured, float)
+        self.simulated = np.asarray(simulated, float)
+        self.flagged = np.zeros(record.n, bool)
+        self.inside = np.ones(record.n, bool)
+        self.step = self._step()
+        self.predicted, self.kept, self.chosen, self.sizes = {}, {}, {}, {}
+
+    def _step(self):
+        """Samples of a lag: more than one where motion and residual are far slower than that."""
+        r = self.r
+        highest = 0.0
+        for values in (r.x, self.e - self.e[r.used].mean()):
+            energy = np.cumsum(np.abs(rfft(values * r.used * np.hanning(r.n)))**2)
+            highest = max(highest, np.searchsorted(energy, _HIGHEST * energy[-1]) / r.n)
+        return int(np.clip(1 / (_FASTER * max(highest, 1e-9)), 1, max(r.n // _FEWEST, 1)))
+
+    def budget(self):
+        r = self.r
+        power = float(np.mean(self.e[r.used]**2))
+        # what is far below the output's own digits is nothing
+        if not power > 1e-28 * max(float(np.mean(self.measured[r.used]**2)), 1e-300):
+            return self._made([], np.zeros((0, r.n)), power)
+        # an offset is no other part's
+        self.predicted["slow"] = np.full(r.n, np.median(self.e[r.used]))
+        self._bursts_first()
+        self._pass()
+        self._leave_out_ends()
+        self._find_bursts(self.e - sum(self.predicted.values()))
+        self._pass()
+        return self._summed(power)
+
+    def _bursts_first(self):
+        """Bursts, before any other part is known: beside a fit to clipped values."""
+        r = self.r
+        moving = np.where(r.used, self.e - self.predicted["slow"], 0.0)
+        size = _CLIPPED * unrelated.scale(moving, self._motion(), r.used)
+        clipped = np.clip(moving, -size, size)
+        predicted = np.zeros(r.n)
+        if r.moves:
+            lengths = [length for length in _LENGTHS[:4] if r.fits(*_span(length), self.step)]
+            lengths = lengths or _LENGTHS[:1]
+            predicted = self._reference_filters(lengths[-1]).predict(clipped)
+            if np.sum((clipped - predicted)[r.used]**2) > np.sum(clipped[r.used]**2):
+                predicted = np.zeros(r.n)
+        self._find_bursts(moving - predicted)
+
+    def _leave_out_ends(self):
+        """Do not judge where the filter found would have to know what lies beyond the record."""
+        length = self.chosen.get("linear")
+        if not isinstance(length, tuple):
+            return
+        low, high = (lag * self.step for lag in length)
+        inside = np.zeros(self.r.n, bool)
+        inside[max(high, 0):self.r.n + min(low, 0)] = True
+        if np.sum(inside & self.r.used) > _STAYS * self.r.used.sum():
+            self.inside = inside
+
+    def _find_bursts(self, rest):
+        found = unrelated.bursts(rest, self._motion(), self.r.used)
+        # what lies before the record and after it rings on in it
+        found[:_ENDS] = found[-_ENDS:] = False
+        self.flagged = found & self.inside
+
+    def _motion(self):
+        return self.simulated if np.ptp(self.simulated) else self.r.x
+
+    def _reference_filters(self, length):
+        r = self.r
+        return r.filters(("linear", length, self.step), lambda: Filters(
+            [r.x], [length], r.blocks, r.used, self.step))
+
+    def _pass(self):
+        """Each part from what the others leave, in their order."""
+        self.again = dict(self.predicted)
+        for part in PARTS[1:-2]:
+            # what repeats contains every other part of a repeated motion
+            others = [values for name, values in self.predicted.items()
+                      if name not in (part, "distortion") or part == "distortion" != name]
+            target = self.e - sum(others) if others else self.e.copy()
+            target[self.flagged] = 0.0
+            self.predicted.pop(part, None)
+            made = self._best(part, target)
+            if made is not None:
+                self.predicted[part], self.kept[part] = made
+
+    @property
+    def counted(self):
+        return self.r.used & ~self.flagged & self.inside
+
+    def _best(self, part, target):
+        """Prediction of the simplest candidate that no other clearly beats.
+
+        And the one that the share is estimated with, where none takes anything.
+        """
+        judged = self.counted
+        best = first = None
+        best_gain, left = np.zeros(len(self.r.blocks)), float(target @ target)
+        worse = 0
+        for place, (name, size, make) in enumerate(self._candidates(part, target)):
+            if part in self.chosen and name != self.chosen[part]:
+                continue
+            predicted = np.where(judged, make(), 0.0)
+            gains = self.r.blocks.sums((2 * target - predicted) * predicted)
+            if first is None:
+                first = name, predicted, size
+            more = gains - best_gain
+            error = np.sqrt(len(more)) * np.std(more)
+            if more.sum() > max((_BETTER if best else _ANY) * error, _WORTH * left):
+                best, best_gain, worse = (name, predicted, size), gains, 0
+            else:
+                worse += 1
+                if worse > 1 and place >= _ALWAYS:
+                    break
+        if first is None:
+            return None
+        if part not in self.chosen:
+            self.chosen[part] = (best or first)[0]
+        _, estimate, self.sizes[part] = best or first
+        return (estimate if best else np.zeros(self.r.n)), estimate
+
+    def _candidates(self, part, target):
+        """Names, numbers of coefficients and makers of predictions of one part, the simplest ones
+        first."""
+        return getattr(self, f"_{part}_candidates")(target)
+
+    def _lines_candidates(self, target):
+        r = self.r
+        if "lines" not in self.chosen:
+            rest = np.where(self.counted, target, 0.0)
+            self.frequencies = unrelated.tones(rest, r.ratio, r.tones, r.period, self.counted)
+        if len(self.frequencies):
+            waves = Modulated(unrelated.tone_waves(self.frequencies), target, self.counted,
+                              r.blocks)
+            for count, orders in enumerate(unrelated.LINE_COURSES):
+                if 2 * orders <= len(r.blocks):
+                    size = 2 * orders * len(self.frequencies)
+                    yield count, size, lambda orders=orders: waves.predict(range(orders))
+
+    def _linear_candidates(self, target):
+        r = self.r
+        if not r.moves:
+            return
+        for length in _LENGTHS:
+            if r.fits(*_span(length), self.step):
+                yield length, _span(length)[0], lambda length=length: self._reference_filters(
+                    length).predict(target, self.flagged)
+        alike = np.corrcoef(self.simulated[r.used], r.x[r.used])[0, 1] \
+            if np.ptp(self.simulated[r.used]) else 1.0
+        length = ((-1, 2), (-4, 8))
+        if abs(alike) < 0.9999 and r.fits(17, 13, self.step):
+            yield "both", 17, lambda: Filters(
+                [r.x, shapes.standardised(self.simulated, r.used)], length, r.blocks, r.used,
+                self.step).predict(target, self.flagged)
+
+    def _across_candidates(self, target):
+        r = self.r
+        others = r.axes[1:]
+        if not others:
+            return
+        for length in _LENGTHS[:5]:
+            size, span = _span(length)
+            if r.fits(size * len(others), span, self.step):
+                yield length, size * len(others), lambda length=length: r.filters(
+                    ("across", length, self.step), lambda: Filters(
+                        others, [length] * len(others), r.blocks, r.used, self.step)).predict(
+                            target, self.flagged)
+
+    def _even_candidates(self, target):
+        return self._shape_candidates("even", shapes.even, target)
+
+    def _odd_candidates(self, target):
+        return self._shape_candidates("odd", shapes.odd, target)
+
+    def _shape_candidates(self, part, make, target):
+        r = self.r
+        if not r.moves:
+            return
+        # what follows the output with its distortion; or, where that is rough, without
+        for output in self._outputs():
+            inputs = make(output, r.used)
+            trials = [(count, length) for length in _SHAPE_LENGTHS for count in (1, len(inputs))]
+            for count, length in (*trials, _RINGING):
+                size, span = _span(length)
+                if r.fits(count * size, span, self.step):
+                    yield (count, length), count * size, functools.partial(
+                        self._filtered, inputs[:count], length, target)
+
+    def _filtered(self, inputs, length, target):
+        return Filters(inputs, [length] * len(inputs), self.r.blocks, self.r.used,
+                       self.step).predict(target, self.flagged)
+
+    def _outputs(self):
+        """The output as the linear part has it and, in the second pass, with its distortion."""
+        linear = self.simulated + self.predicted.get("linear", 0.0)
+        if not np.ptp(linear):
+            linear = self.r.x
+        more = sum((self.again.get(part, 0.0) for part in ("even", "odd")), np.zeros(self.r.n))
+        return [linear, linear + more] if more.any() else [linear]
+
+    def _time_varying_candidates(self, target):
+        r = self.r
+        if not r.moves:
+            return
+        y = shapes.standardised(self._outputs()[0], r.used)
+        v = shapes.standardised(np.gradient(y), r.used)
+        bases = [y, v, shapes.standardised(np.gradient(v), r.used)]
+        if abs(np.corrcoef(y[r.used], r.x[r.used])[0, 1]) < 0.999:
+            bases.append(shapes.standardised(r.x, r.used))
+
+        def columns(start, stop):
+            return np.stack([base[start:stop] for base in bases], axis=1)
+        waves = Modulated(columns, target, self.counted, r.blocks)
+        for count in _COURSES:
+            if count * len(bases) * _SAMPLES <= r.used.sum() and 2 * count <= len(r.blocks):
+                yield count, count * len(bases), lambda count=count: waves.predict(
+                    range(1, count + 1))
+
+    def _slow_candidates(self, target):
+        for count, values in enumerate(unrelated.slow_candidates(
+                target, self.counted, self.r.lowest, target)):
+            yield count, unrelated.FEWEST * 2**count, lambda values=values: values
+
+    def _distortion_candidates(self, target):
+        r = self.r
+        if r.period and r.n >= 2 * r.period:
+            yield 0, r.period, lambda: repeats.repeating(target, self.counted, r.period)
+
+    def _summed(self, power):
+        """Shares from the held-out products of what is left and what is predicted."""
+        r = self.r
+        counted = self.counted
+        sure = np.where(counted, self.e, 0.0)
+        # bursts stand on the power that the others have there, too
+        usual = np.mean(sure[counted]**2)
+        burst = np.where(self.flagged, self.e**2 - usual, 0.0)
+        background = np.where(counted, sure**2, 0.0)
+        background[self.flagged] = usual
+        names, products, reductions = ["bursts"], [burst], [burst]
+        spectra = {"bursts": (np.where(self.flagged, self.e, 0.0),) * 2}
+        left = sure.copy()
+        for part in PARTS[1:-2]:
+            if part not in self.kept:
+                continue
+            later = sum((self.predicted[name] for name in PARTS[PARTS.index(part) + 1:]
+                         if name in self.predicted and name != "distortion"), np.zeros(r.n))
+            estimate = np.where(counted, self.kept[part], 0.0)
+            # what is taken is taken from what the earlier ones left: so do the shares add up
+            alone = np.where(counted, left - later, 0.0)
+            target = left if self.predicted[part].any() else alone
+            for name, piece in self._by_parity(part, estimate):
+                reductions.append((2 * target - piece) * piece)
+                names.append(name)
+                products.append(reductions[-1] + self._error(alone, piece, self.sizes[part]))
+                spectra[name + str(len(names))] = target, piece
+            left -= np.where(counted, self.predicted[part], 0.0)
+        if self.other is not None:
+            other = np.where(counted, self.other - np.mean(self.other[counted]), 0.0)
+            names.append("reference")
+            products.append(left * other)
+            reductions.append(left * other)
+            spectra["reference" + str(len(names))] = left, other
+        return self._made(names, np.array(products), power, np.array(reductions),
+                          burst + background, list(spectra.values()))
+
+    def _error(self, target, predicted, size):
+        """Power of a fit's own error, by which held-out data lose less than it explains.
+
+        Per sample. It is what the prediction has more than it shares with the target, but no more
+        than a few times what as many coefficients fit to noise.
+        """
+        counted = self.counted
+        error = np.sum((predicted - target) * predicted)
+        left = np.sum((target - predicted)[counted]**2)
+        most = _COLOURED * min(size / counted.sum(), 1.0) * left
+        return counted * (np.clip(error, 0.0, most) / counted.sum())
+
+    def _by_parity(self, part, estimate):
+        """Distortion on even and odd lines, where these can be told apart."""
+        if part == "distortion":
+            parted = repeats.by_parity(estimate, self.r.x, self.r.period)
+            if parted is not None:
+                return list(zip(("even", "odd"), parted))
+        return [(part, estimate)]
+
+    def _made(self, names, products, power, reductions=None, weights=None, spectra=()):
+        r = self.r
+        output = float(np.std(self.measured[r.used]))
+        edges = np.r_[0.0, r.rate / 2 * 2.0**np.arange(-_OCTAVES, 1)]
+        stretches = np.linspace(0, r.n, _STRETCHES + 1).astype(int)
+        parts, in_bands, along = [], {}, {}
+        if len(names):
+            whole = weights.sum()
+            raw = products.sum(axis=1) / whole
+            merged = {name: [i for i, other in enumerate(names) if other == name]
+                      for name in dict.fromkeys(names)}
+            raw = np.array([raw[rows].sum() for rows in merged.values()])
+            blocks = r.blocks.sums(np.array([reductions[rows].sum(axis=0)
+                                             for rows in merged.values()]))
+            # last of all what none takes
+            raw = np.r_[raw, 1 - raw.sum()]
+            sums = r.blocks.sums(weights)
+            blocks = np.r_[blocks, [sums - blocks.sum(axis=0)]]
+            bounds = intervals(blocks, raw, sums)
+            shares = np.clip(raw, 0.0, None)
+            shares /= max(shares.sum(), 1e-300)
+            bounds[:, 0] = np.minimum(bounds[:, 0], shares)
+            bounds[:, 1] = np.maximum(bounds[:, 1], shares)
+            left = self.r.blocks.sums(weights).sum()
+            judged = np.where(self.inside, self.e, 0.0)
+            band_rest = _band_power(judged, judged, edges, r.rate) / left
+            time_rest = np.add.reduceat(weights, stretches[:-1]) / left
+            for name, rows in merged.items():
+                in_bands[name] = sum(_band_power(*spectra[i], edges, r.rate) for i in rows) / left
+                along[name] = np.add.reduceat(products[rows].sum(axis=0), stretches[:-1]) / left
+                band_rest, time_rest = band_rest - in_bands[name], time_rest - along[name]
+            in_bands["noise"], along["noise"] = band_rest, time_rest
+            rms = np.sqrt(power)
+            order = [*merged, "noise"]
+            for name in PARTS:
+                if name in order:
+                    i = order.index(name)
+                    parts.append({
+                        "part": name, "share": float(shares[i]), "ci95": bounds[i].tolist(),
+                        "of_output": float(rms * np.sqrt(shares[i]) / max(output, 1e-300))})
+        return Budget(parts, float(np.sqrt(power)), output, edges, in_bands, stretches / r.rate,
+                      along)
+
+
+def _span(length):
+    """Coefficients of a filter, and the samples that it spans."""
+    return (length[1] - length[0] + 1,) * 2
+
+
+def _band_power(one, other, edges, rate):
+    """Sum of the product of two signals, by bands."""
+    shared = np.real(np.conj(rfft(one)) * rfft(other)) / len(one)
+    shared[1:] *= 2
+    if len(one) % 2 == 0:
+        shared[-1] /= 2
+    place = np.searchsorted(edges, np.arange(len(shared)) * rate / len(one), "right") - 1
+    return np.bincount(np.minimum(place, len(edges) - 2), shared, len(edges) - 1)

@@ -1,0 +1,197 @@
+"""From two topics and a model to what is left: the pair of any record that can be read."""
+
+import dataclasses
+
+import numpy as np
+
+from ..effects.fit_starts import bulk_shift
+from ..errors import FracAccelError
+from ..model import AXES
+from ..pair import Pair, clean, make_pair
+from ..simulation import simulate
+from .division import Division
+from .noise import established_noise, unaccounted
+
+_FEWEST = 32
+# Intervals of a topic's own over which its values are interpolated.
+_GAP = 2.5
+
+
+@dataclasses.dataclass(frozen=True)
+class Left:
+    """What a model leaves of a record.
+
+    Attributes
+    ----------
+    model : str
+        Which model it is, in words.
+    budget : Budget
+    noise : EstablishedNoise
+    unaccounted : dict
+    words : list of str
+        What had to be done to the record.
+    """
+
+    model: str
+    budget: object
+    noise: object
+    unaccounted: dict
+    words: list
+
+    def as_dict(self):
+        """Plain numbers for a result file."""
+        return {"model": self.model, "rms": self.budget.rms, "output_rms": self.budget.output_rms,
+                "budget": self.budget.as_list(), "established_noise": self.noise.as_dict(),
+                "unaccounted": self.unaccounted, "words": [*self.words, *self.noise.words],
+                **self.budget.picture()}
+
+
+def left_by(reference, sensor, model=None, axis="x", noise_std=None, second_sensor=None,
+            temperature_at=None):
+    """Error budget of a record.
+
+    Parameters
+    ----------
+    reference, sensor : Samples
+    model : SensorModel, optional
+        Without it, the best static gain and offset with a delay of whole samples.
+    axis : {"x", "y", "z"}
+    noise_std : float, optional
+        What the user states [output units].
+    second_sensor : Samples, optional
+        Of another sensor on the same body.
+    temperature_at : callable, optional
+        Temperature [°C] at an array of stamps [ns]; needed by a model that depends on it.
+
+    Returns
+    -------
+    Left
+
+    Raises
+    ------
+    FracAccelError
+        If there are too few samples, none in common, or the sensor's axis never changes.
+    """
+    column, words = AXES.index(axis), []
+    pair = _pair(reference, sensor, axis, words)
+    other_values = None
+    if second_sensor is not None:
+        other_values = _second(pair, second_sensor, column)
+    measured, used = pair.sensor[:, column], pair.valid
+    simulated, what = _simulated(pair, measured, model, axis, column, temperature_at)
+    residual = np.where(used, measured - simulated, 0.0)
+    other = None if other_values is None else _shared_residual(
+        pair, other_values, measured, column, words)
+    division = Division(pair.reference, used, pair.sampling_rate_hz, column)
+    budget = division.of(residual, measured, simulated, other)
+    noise = established_noise(residual, measured, pair.reference, used, pair.sampling_rate_hz,
+                              pair.sensor_std, noise_std, other, division.period)
+    return Left(what, budget, noise, unaccounted(budget.rms, budget.output_rms, noise), words)
+
+
+def _pair(reference, sensor, axis, words):
+    """Pair on uniform instants; by stamps where the topics' own clocks do not fit each other."""
+    try:
+        return make_pair(reference, sensor, axis)
+    except FracAccelError as error:
+        try:
+            pair = _by_stamps(reference, sensor)
+        except FracAccelError:
+            raise error from None
+        if not np.ptp(pair.sensor[pair.valid][:, AXES.index(axis)]):
+            raise
+        words.append("the two topics were interpolated to common instants at "
+                     f"{pair.sampling_rate_hz:.6g} Hz, since {error}")
+        return pair
+
+
+def _by_stamps(reference, sensor):
+    """Both topics by straight lines between their stamps, at the lower of the two rates."""
+    topics = [clean(reference), clean(sensor)]
+    if min(len(stamps) for stamps, _ in topics) < _FEWEST:
+        raise FracAccelError(f"expected at least {_FEWEST} usable samples of each topic")
+    intervals = [float(np.median(np.diff(stamps))) for stamps, _ in topics]
+    start = max(stamps[0] for stamps, _ in topics)
+    stop = min(stamps[-1] for stamps, _ in topics)
+    interval = max(intervals)
+    count = int((stop - start) // interval) + 1
+    if stop < start or count < _FEWEST:
+        raise FracAccelError("reference and sensor have no time in common")
+    if count > 50 * max(len(stamps) for stamps, _ in topics):
+        raise FracAccelError("the stamps leave gaps that are far longer than the record")
+    grid = np.arange(count) * interval
+    values, valid = [], np.ones(count, bool)
+    for (stamps, samples), own in zip(topics, intervals):
+        seconds = (stamps - start).astype(float)
+        after = np.clip(np.searchsorted(seconds, grid), 1, len(seconds) - 1)
+        valid &= seconds[after] - seconds[after - 1] < _GAP * own
+        values.append(np.stack([np.interp(grid, seconds, samples[:, i]) for i in range(3)], 1))
+    if valid.sum() < _FEWEST:
+        raise FracAccelError("too few instants at which both topics have samples")
+    return Pair(1e9 / interval, *values, valid, 0.0, int(start), float("nan"))
+
+
+def _simulated(pair, measured, model, axis, column, temperature_at):
+    """Output that the model in use gives, and what model it is."""
+    if model is not None:
+        instants = pair.start_ns + np.arange(len(pair)) * 1e9 / pair.sampling_rate_hz
+        celsius = None if temperature_at is None else temperature_at(instants)
+        values = simulate(model, pair.reference, pair.sampling_rate_hz, initial="steady",
+                          temperature_c=celsius)[:, column]
+        if pair.lag_s:
+            place = np.arange(len(pair)) + pair.lag_s * pair.sampling_rate_hz
+            values = _between(values, place)
+        return values, "the given model"
+    simulated, gain, shift = _static(pair.reference[:, column], measured, pair.valid)
+    late = f", {abs(shift)} sample(s) {'later' if shift > 0 else 'earlier'}" if shift else ""
+    return simulated, f"the best static gain, {gain:.5g}, and offset{late} (no --model was given)"
+
+
+def _between(values, place):
+    """Values at fractional places, by a spline."""
+    from scipy.interpolate import CubicSpline
+    return CubicSpline(np.arange(len(values)), values)(np.clip(place, 0, len(values) - 1))
+
+
+def _static(reference, measured, used):
+    """Reference times the gain that fits best, with an offset, maybe whole samples of delay."""
+    best = None
+    shift = bulk_shift(reference, measured, used) if np.ptp(reference[used]) else 0
+    if abs(shift) > len(reference) // 4:
+        shift = 0
+    for samples in dict.fromkeys((0, int(shift))):
+        moved = np.roll(reference, samples)
+        if samples > 0:
+            moved[:samples] = reference[0]
+        elif samples < 0:
+            moved[samples:] = reference[-1]
+        x, y = moved - moved[used].mean(), measured - measured[used].mean()
+        power = float(x[used] @ x[used])
+        gain = float(x[used] @ y[used]) / power if power else 0.0
+        left = float(np.sum((y - gain * x)[used]**2))
+        # a shift must be worth it
+        if best is None or left < 0.99 * best[0]:
+            best = left, gain * moved + (measured - gain * moved)[used].mean(), gain, samples
+    return best[1:]
+
+
+def _second(pair, samples, column):
+    """The second sensor at the pair's instants."""
+    stamps, values = clean(samples)
+    if len(stamps) < _FEWEST:
+        raise FracAccelError(f"second sensor: {len(stamps)} usable sample(s), expected at least "
+                             f"{_FEWEST}")
+    grid = np.arange(len(pair)) * 1e9 / pair.sampling_rate_hz
+    return np.interp(grid, (stamps - pair.start_ns).astype(float), values[:, column])
+
+
+def _shared_residual(pair, values, measured, column, words):
+    """Residual of the second sensor in the first one's units."""
+    reference = pair.reference[:, column]
+    simulated, gain, _ = _static(reference, values, pair.valid)
+    _, own, _ = _static(reference, measured, pair.valid)
+    if not gain:
+        words.append("the second sensor does not follow the reference: not used")
+        return None
+    left = values - simulated
+    return (left - left[pair.valid].mean()) * own / gain
