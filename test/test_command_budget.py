@@ -10,7 +10,7 @@ from budget_cases import excitation
 from frac_accel.bag import RAW_TOPIC, REFERENCE_TOPIC, write_bag
 from frac_accel.budget import PARTS
 from frac_accel.cli import main
-from frac_accel.samples import Samples
+from frac_accel.record.samples import Samples
 
 REAL = pytest.mark.skipif(not real_records.FOLDER.is_dir(),
                           reason="the records in ../shared/data are not here")
@@ -82,10 +82,10 @@ def test_bad_input_is_one_line(tmp_path, capsys):
 
 def independent_correlation(bag):
     """Correlation of both phones' residuals by 41 taps, fitted on one half, judged on the other."""
-    from frac_accel.pair import load_pair
+    from frac_accel.record import Record
     left = []
     for topic in (RAW_TOPIC, "/phone2/data_raw"):
-        pair = load_pair(bag, sensor=topic)
+        pair = Record.load(bag, sensor=topic)
         x, y = (v[:, 0] - v[:, 0].mean() for v in (pair.reference, pair.sensor))
         first = np.arange(len(x)) < len(x) // 2
         columns = np.stack([np.roll(x, k) for k in range(-20, 21)], axis=1)

@@ -7,7 +7,8 @@ import numpy as np
 from ..effects.fit_starts import bulk_shift
 from ..errors import FracAccelError
 from ..model import AXES
-from ..pair import Pair, clean, make_pair
+from ..record import Record
+from ..record.clock import usable
 from ..simulation import simulate
 from .division import Division
 from .noise import established_noise, unaccounted
@@ -73,7 +74,8 @@ def left_by(reference, sensor, model=None, axis="x", noise_std=None, second_sens
         If there are too few samples, none in common, or the sensor's axis never changes.
     """
     column, words = AXES.index(axis), []
-    pair = _pair(reference, sensor, axis, words)
+    pair = Record.of(reference, sensor, axis)
+    words += pair.words
     other_values = None
     if second_sensor is not None:
         other_values = _second(pair, second_sensor, column)
@@ -87,48 +89,6 @@ def left_by(reference, sensor, model=None, axis="x", noise_std=None, second_sens
     noise = established_noise(residual, measured, pair.reference, used, pair.sampling_rate_hz,
                               pair.sensor_std, noise_std, other, division.period)
     return Left(what, budget, noise, unaccounted(budget.rms, budget.output_rms, noise), words)
-
-
-def _pair(reference, sensor, axis, words):
-    """Pair on uniform instants; by stamps where the topics' own clocks do not fit each other."""
-    try:
-        return make_pair(reference, sensor, axis)
-    except FracAccelError as error:
-        try:
-            pair = _by_stamps(reference, sensor)
-        except FracAccelError:
-            raise error from None
-        if not np.ptp(pair.sensor[pair.valid][:, AXES.index(axis)]):
-            raise
-        words.append("the two topics were interpolated to common instants at "
-                     f"{pair.sampling_rate_hz:.6g} Hz, since {error}")
-        return pair
-
-
-def _by_stamps(reference, sensor):
-    """Both topics by straight lines between their stamps, at the lower of the two rates."""
-    topics = [clean(reference), clean(sensor)]
-    if min(len(stamps) for stamps, _ in topics) < _FEWEST:
-        raise FracAccelError(f"expected at least {_FEWEST} usable samples of each topic")
-    intervals = [float(np.median(np.diff(stamps))) for stamps, _ in topics]
-    start = max(stamps[0] for stamps, _ in topics)
-    stop = min(stamps[-1] for stamps, _ in topics)
-    interval = max(intervals)
-    count = int((stop - start) // interval) + 1
-    if stop < start or count < _FEWEST:
-        raise FracAccelError("reference and sensor have no time in common")
-    if count > 50 * max(len(stamps) for stamps, _ in topics):
-        raise FracAccelError("the stamps leave gaps that are far longer than the record")
-    grid = np.arange(count) * interval
-    values, valid = [], np.ones(count, bool)
-    for (stamps, samples), own in zip(topics, intervals):
-        seconds = (stamps - start).astype(float)
-        after = np.clip(np.searchsorted(seconds, grid), 1, len(seconds) - 1)
-        valid &= seconds[after] - seconds[after - 1] < _GAP * own
-        values.append(np.stack([np.interp(grid, seconds, samples[:, i]) for i in range(3)], 1))
-    if valid.sum() < _FEWEST:
-        raise FracAccelError("too few instants at which both topics have samples")
-    return Pair(1e9 / interval, *values, valid, 0.0, int(start), float("nan"))
 
 
 def _simulated(pair, measured, model, axis, column, temperature_at):
@@ -177,7 +137,8 @@ def _static(reference, measured, used):
 
 def _second(pair, samples, column):
     """The second sensor at the pair's instants."""
-    stamps, values = clean(samples)
+    good = usable(samples)
+    stamps, values = samples.stamps_ns[good], samples.values[good]
     if len(stamps) < _FEWEST:
         raise FracAccelError(f"second sensor: {len(stamps)} usable sample(s), expected at least "
                              f"{_FEWEST}")

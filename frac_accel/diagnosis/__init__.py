@@ -14,10 +14,10 @@ from ..identification.excitation import learning_length, require_excitation
 from ..identification.record_checks import moving_samples
 from ..model import AXES, SensorModel
 from ..record import Record
-from ..record.orientation import turned_away
+from ..record.orientation import Orientation, turned_away
 from ..simulation import AxisSimulator
 from .engine import Engine
-from .judgement import Diagnosis, EstablishedNoise, Finding, insufficient, judge
+from .judgement import Diagnosis, Finding, insufficient, judge
 from .leftover import related
 from .spikes import spikes
 from .time_limit import TimeLimit
@@ -67,6 +67,8 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
         If the record cannot be used, the sensor does not follow the reference, or no classical
         model can be identified although the excitation would do.
     """
+    if noise_std is not None and not (np.isfinite(noise_std) and noise_std > 0):
+        raise FracAccelError(f"noise_std: {noise_std} given, expected a number above 0")
     progress = progress or (lambda words: None)
     limit = TimeLimit(time_limit_s)
     if isinstance(source, (str, Path)):
@@ -75,7 +77,9 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     column = AXES.index(axis)
     progress("checking the data")
     record = Record.of(*source, axis, temperature)
+    record, source, turned = _in_axes_of_reference(record, source, axis, temperature)
     found = record.integrity(column)
+    found.words.extend(turned)
     if len(record) < _FEWEST:
         return insufficient(f"the record has {len(record)} samples, expected at least {_FEWEST}",
                             model, found)
@@ -115,7 +119,21 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
                            "not: spikes, which count in no fit")
     _require_relation(engine, axis, seed)
     return judge(engine, engine.run(seed), found, shown, loose, source[1],
-                 _stated_noise(noise_std))
+                 noise_std)
+
+
+def _in_axes_of_reference(record, source, axis, temperature):
+    """The record of a sensor whose axis follows another one, turned; its topics, and words."""
+    orientation = Orientation.of(record)
+    if orientation is None or not orientation.astray(axis):
+        return record, source, []
+    try:
+        source = source[0], orientation.turn(source[1])
+        turned = Record.of(*source, axis, temperature)
+    except FracAccelError:
+        return record, source, []  # the refusal says which axis it follows
+    return turned, source, [f"the sensor lies turned: {orientation.words}; what follows holds for "
+                            "its signal turned into the reference's axes"]
 
 
 def _without_spikes(engine, used, stray, reference):
@@ -123,14 +141,6 @@ def _without_spikes(engine, used, stray, reference):
     first = engine(used=used)
     more = used & spikes(first.search.fit(first.search.base).residual, reference)
     return (engine(used=used & ~more) if more.any() else first), stray | more
-
-
-def _stated_noise(std):
-    if std is None:
-        return None
-    if not (np.isfinite(std) and std > 0):
-        raise FracAccelError(f"noise_std: {std} given, expected a number above 0")
-    return EstablishedNoise(float(std), "stated")
 
 
 def _shown(found, measured):

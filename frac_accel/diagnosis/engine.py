@@ -1,11 +1,13 @@
 """Diagnosis of one axis: from a record and a model to named causes."""
 
 import dataclasses
+import functools
 
 import numpy as np
 from scipy.fft import rfft
 from scipy.ndimage import uniform_filter1d
 
+from ..budget import Division, established_noise
 from ..effects import effect_of
 from ..errors import FracAccelError
 from ..identification.excitation import (
@@ -196,6 +198,27 @@ class Engine:
         for unknown, std in zip(fitted.unknowns, stds):
             result.setdefault(unknown.cause, {})[unknown.name] = float(std)
         return result
+
+    @functools.cached_property
+    def _division(self):
+        p = self.problem
+        return Division(p.record.reference, p.record.valid, p.rate, p.axis)
+
+    def established_noise(self, fitted, stated_std=None):
+        """`EstablishedNoise` of the record, beside a fit."""
+        p = self.problem
+        return established_noise(fitted.residual, p.measured, p.record.reference, p.used, p.rate,
+                                 p.record.sensor_std, stated_std, None, self._division.period)
+
+    def budget(self, fitted):
+        """`Budget` of what a fit leaves, of all samples that are there; None without time for it.
+        """
+        p = self.problem
+        if p.limit.ends_judging("the error budget was left out"):
+            return None
+        residual = np.where(p.record.valid, p.measured - fitted.output, 0.0)
+        residual[:p.edge] = residual[len(residual) - p.edge:] = 0.0
+        return self._division.of(residual, p.measured, fitted.output)
 
     def learnt(self, fitted):
         """The same causes, fitted to the learning part of the record only."""

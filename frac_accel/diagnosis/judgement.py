@@ -2,12 +2,12 @@
 
 import dataclasses
 import math
-from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import resample_poly
 
+from ..budget import WORDS
 from ..effects import known_effects
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..parameters import parameter_fields
@@ -19,6 +19,10 @@ from .names import cancelling, undetermined
 # error may exceed noise that is.
 _LITTLE = 0.05
 _AS_NOISE = 1.2
+# Share of what is left that a part of the error budget must have, and at least may have, to be no
+# noise.
+_PART = 0.1
+_PART_AT_LEAST = 0.03
 # Share of the excess power that rounds to nothing.
 _NOTHING = 0.0005
 # Standard uncertainties by which a delay below zero is one.
@@ -104,6 +108,8 @@ class Diagnosis:
         ``rms`` [output units] and ``by`` (what shows it); None where nothing does.
     cut_off : str or None
         What a time limit left out.
+    budget : list of dict
+        ``part``, ``of`` (baseline or extended), ``share`` of what is left, and its ``ci95``.
     """
 
     verdict: str
@@ -120,12 +126,13 @@ class Diagnosis:
     established_noise: dict = dataclasses.field(
         default_factory=lambda: {"rms": None, "by": None})
     cut_off: str | None = None
+    budget: list = dataclasses.field(default_factory=list)
 
     def as_dict(self, model_file=None):
         """As the result file has it."""
         return {"verdict": self.verdict, "reason": self.reason,
                 "established_noise": self.established_noise, "cut_off": self.cut_off,
-                "baseline": self.baseline,
+                "budget": self.budget, "baseline": self.baseline,
                 "findings": [finding.as_dict() for finding in self.findings],
                 "suspects": self.suspects,
                 "extended": {**self.extended, "model": model_file},
@@ -139,25 +146,6 @@ def insufficient(reason, model, found):
     errors = {"rmse": nan, "nrmse": nan}
     return Diagnosis("insufficient_data", reason, {**errors, "noise_rms": nan}, [], [], errors, nan,
                      model, found)
-
-
-class EstablishedNoise(NamedTuple):
-    """Noise that something other than a model's own residual shows.
-
-    Attributes
-    ----------
-    rms : float
-        [output units]
-    by : str
-        rest, covariance, periods, stated or second_sensor.
-    """
-
-    rms: float
-    by: str
-
-    def as_dict(self):
-        """As the result file has it."""
-        return self._asdict()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -199,7 +187,7 @@ class Seen:
                                           len(self.output) - 1))
 
 
-def judge(engine, best, found, shown, loose, sensor, noise=None):
+def judge(engine, best, found, shown, loose, sensor, noise_std=None):
     """Verdict on the best set of causes.
 
     Parameters
@@ -213,8 +201,8 @@ def judge(engine, best, found, shown, loose, sensor, noise=None):
         Causes that were free in every fit.
     sensor : Samples
         The sensor's samples as they were recorded.
-    noise : EstablishedNoise, optional
-        What the record shows, or somebody says, of its noise.
+    noise_std : float, optional
+        Standard deviation of the noise, where somebody states it [output units].
 
     Returns
     -------
@@ -222,6 +210,7 @@ def judge(engine, best, found, shown, loose, sensor, noise=None):
     """
     best, gains = _relevant(engine, best)
     left = engine.left(best)
+    noise = engine.established_noise(best, noise_std)
     stds = engine.uncertainties(best)
     doubts = _doubts(engine, best, gains, stds, left, noise)
     findings, suspects = [], []
@@ -295,7 +284,7 @@ def _acausal(engine, best, stds):
 def _accounted(rmse, problem, noise):
     """Whether an error is small, or no larger than noise that is established."""
     spread = float(np.std(problem.measured[problem.used]))
-    return rmse <= _LITTLE * spread or (noise is not None and rmse <= _AS_NOISE * noise.rms)
+    return rmse <= _LITTLE * spread or (noise.rms is not None and rmse <= _AS_NOISE * noise.rms)
 
 
 def _suspect(causes, margin, reason):
@@ -340,19 +329,34 @@ def _verdict(engine, best, left, findings, suspects, found, noise):
     # what the record shows by itself, such as scattered stamps, is no part of the model
     by_itself = [f.gain.after for f in findings if f.cause not in fitted.effects]
     accounted = _accounted(min([after, *by_itself]), p, noise)
-    verdict = _word(findings, suspects, complete, left.share, fraction, accounted)
+    budget = engine.budget(fitted)
+    strange = _structured(budget)
+    verdict = _word(findings, suspects, complete, left.share, fraction, accounted, strange)
     model = _extended(engine, {**fitted.effects, **{f.cause: f.effect for f in findings}})
     return Diagnosis(
-        verdict, _reason(verdict, after / spread, noise, accounted),
+        verdict, _reason(verdict, after / spread, noise, accounted, strange),
         {"rmse": before, "nrmse": before / spread, "noise_rms": noise_rms},
         findings, suspects,
         {"rmse": after, "nrmse": after / spread},
         float(min(fraction, 1.0)), model, found, engine, best,
-        noise.as_dict() if noise else {"rms": None, "by": None}, p.limit.summary())
+        noise.as_dict(), p.limit.summary(),
+        [entry for of, parted in (("baseline", engine.budget(baseline)), ("extended", budget))
+         if parted is not None for entry in parted.as_list(of)])
 
 
-def _word(findings, suspects, complete, share, fraction, accounted):
+def _structured(budget):
+    """Parts of what is left that are no noise, with their shares, the largest first."""
+    if budget is None:
+        return []
+    return sorted(((entry["share"], entry["part"]) for entry in budget.parts
+                   if entry["part"] != "noise" and entry["share"] > _PART
+                   and entry["ci95"][0] > _PART_AT_LEAST), reverse=True)
+
+
+def _word(findings, suspects, complete, share, fraction, accounted, strange):
     if not findings and not suspects and share == 0:
+        if strange:
+            return "unexplained"
         return "consistent" if accounted else "undecided"
     nothing = fraction < _NOTHING
     if findings and (nothing or complete and share <= _MOSTLY_NOISE):
@@ -362,18 +366,22 @@ def _word(findings, suspects, complete, share, fraction, accounted):
     return "unexplained"
 
 
-def _reason(verdict, nrmse, noise, accounted):
-    known = noise is not None and accounted and nrmse > 0
-    to = {"rest": "down to the noise that it shows at rest",
-          "covariance": "down to the noise that its messages state",
-          "periods": "down to the noise that its repeated periods show",
-          "stated": "down to the noise that was stated",
-          "second_sensor": "down to the noise that the second sensor shows",
-          }[noise.by] if known else f"up to {nrmse:.2%} of the output"
+def _reason(verdict, nrmse, noise, accounted, strange):
+    shown = {"rest": "down to the noise that it shows at rest",
+             "covariance": "down to the noise that its messages state",
+             "periods": "down to the noise by which its repeated periods differ",
+             "stated": "down to the noise that was stated",
+             "second_sensor": "down to the noise that a second sensor does not share"}
+    to = shown[noise.by] if noise.rms is not None and nrmse > _LITTLE and accounted \
+        else f"up to {nrmse:.2%} of the output"
+    left = ""
+    if strange:
+        parts = ", ".join(f"{share:.0%} {part} ({WORDS[part]})" for share, part in strange[:2])
+        left = f"; of what is left: {parts}"
     return {"consistent": f"the model explains the record {to}",
             "explained": f"the named causes explain the record {to}",
-            "partly_explained": "the named causes leave a part unexplained",
-            "unexplained": "no known cause explains what the model gets wrong",
+            "partly_explained": "the named causes leave a part unexplained" + left,
+            "unexplained": "no known cause explains what the model gets wrong" + left,
             "undecided": f"{nrmse:.1%} of the output is unaccounted for; nothing in the record "
                          "shows that it is noise; record the sensor at rest too, or repeat the "
                          "same motion, or state its noise (--noise-std)"}[verdict]

@@ -161,8 +161,8 @@ class Problem:
         self.time = np.arange(len(record)) / self.rate  # since this part's start
         self.measured = record.sensor[:, axis]
         self.used = used.copy()
-        edge = min(_EDGE, len(record) // 16)
-        self.used[:edge] = self.used[-edge:] = False
+        self.edge = min(_EDGE, len(record) // 16)
+        self.used[:self.edge] = self.used[len(record) - self.edge:] = False
         self._simulators = {}
         self._last, self._moved, self._others = (None, None), (None, None), {}
         self._columns = {}
