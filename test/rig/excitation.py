@@ -40,9 +40,10 @@ class Excitation:
 class Grid:
     """Time axis of an excitation; t = 0 is the record's first sample."""
 
-    def __init__(self, rate_hz, duration_s, lead_s=0.0, oversampling=64):
-        if oversampling < 64 or oversampling % 2:
-            raise ValueError(f"oversampling {oversampling}: expected an even number from 64")
+    def __init__(self, rate_hz, duration_s, lead_s=0.0, oversampling=64, least=64):
+        """`least` oversampling may be below 64 only where the content ends far below `rate_hz`."""
+        if oversampling < least or oversampling % 2:
+            raise ValueError(f"oversampling {oversampling}: expected an even number from {least}")
         self.rate_hz, self.oversampling = rate_hz, oversampling
         self.samples = round(duration_s * rate_hz)
         lead = int(np.ceil(lead_s * rate_hz))
