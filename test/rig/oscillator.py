@@ -19,9 +19,9 @@ sticks until the other forces exceed the Coulomb level.
 A stop is a further spring, :math:`\kappa` times as stiff, that acts on what q exceeds the stop's
 place by; a step is split where q comes to it or leaves it.
 
-With a drift, :math:`\omega_0 (1 + r t)` stands in every place of :math:`\omega_0`; quadratic damping
-adds :math:`d\, q' |q'| / \omega_0^2` to the spring's bracket. Both are taken into the iteration that
-solves for the nonlinear spring, on top of the constant linear part.
+With a drift, :math:`\omega_0 (1 + r t)` stands in every place of :math:`\omega_0`; quadratic
+damping adds :math:`d\, q' |q'| / \omega_0^2` to the spring's bracket. Both are taken into the
+iteration that solves for the nonlinear spring, on top of the constant linear part.
 """
 
 import dataclasses
