@@ -20,6 +20,12 @@ def transfer_function(sensor, axis, s):
         w = 2 * np.pi * effects["mounting_resonance"]["frequency_hz"]
         ratio = effects["mounting_resonance"]["damping_ratio"]
         response = response * (2 * ratio * w * s + w ** 2) / (s ** 2 + 2 * ratio * w * s + w ** 2)
+    if "two_mounts" in effects:
+        mounts = effects["two_mounts"]
+        for name in ("first_hz", "second_hz"):
+            w, ratio = 2 * np.pi * mounts[name], mounts["damping_ratio"]
+            passed = 2 * ratio * w * s + w ** 2
+            response = response * passed / (s ** 2 + passed)
     if "second_resonance" in effects:
         mode = effects["second_resonance"]
         w = 2 * np.pi * mode["frequency_hz"]

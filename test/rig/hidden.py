@@ -168,7 +168,7 @@ def _draw(rng, seed, causes, kind, excitation_name, times_noise):
     """One draw; None where an effect is too small, or more than the sensor survives."""
     core, snr_db = _draw_core(rng, KINDS[kind])
     excitation = _draw_excitation(rng, excitation_name)
-    temperature_c = _draw_temperature(rng, excitation.samples)
+    temperature_c = draw_temperature(rng, excitation.samples)
     bench = Bench(core, excitation, temperature_c)
     bench.noise_std = bench.clean.std() * 10 ** (-snr_db / 20)
     drawn = draw_effects(rng, bench, causes, times_noise)
@@ -216,7 +216,7 @@ def _draw_excitation(rng, name) -> Excitation:
     return noise_bursts(rng, RATE_HZ, duration_s, band_hz, levels, amplitude)
 
 
-def _draw_temperature(rng, samples):
+def draw_temperature(rng, samples):
     """A smooth course between 10 and 50 °C that is no straight line in time."""
     t = np.linspace(0, 1, samples)
     course = rng.uniform(-1, 1) * t + rng.uniform(0.3, 1) * np.sin(

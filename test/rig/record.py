@@ -157,7 +157,8 @@ def _sampled(sensor, grids, excitation, t, scatter, temperature_c, phases):
         own = plain[axis]
         if "delayed_cross_talk" in effects:
             talk = effects["delayed_cross_talk"]
-            own = own + talk["coefficient"] * read((axis + 1) % 3, effects, talk["delay_s"])
+            other = read((axis + 1) % 3, effects, talk["delay_s"])
+            own = own + talk["coefficient"] * (other - other.mean())
         values[:, axis] = (_gain(effects, t, temperature_c) * own
                            * unknown.gain(effects, t, plain[(axis + 1) % 3]))
     values = values @ _cross_axis(by_axis).T

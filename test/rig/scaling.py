@@ -38,7 +38,7 @@ class Bench:
         Of axis x; set by whoever knows the signal.
     logger : Logger
     surroundings : dict of str to dict
-        Causes that are there in any case.
+        Effects that are there in any case, and that the model in use has too.
     """
 
     core: dict
@@ -60,7 +60,7 @@ class Bench:
 
     def output(self, effects, excitation=None):
         """Noise-free values of axis x, with every sample in its place; infinite where it breaks."""
-        effects = {cause: own for cause, own in effects.items()
+        effects = {cause: own for cause, own in {**self.surroundings, **effects}.items()
                    if cause not in ON_STAMPS and cause not in ON_REFERENCE}
         excitation = excitation or (self.excitation if ACROSS & set(effects) else self._along_x)
         try:
@@ -85,7 +85,7 @@ class Bench:
         if cause == "interference_bursts":
             return own["rms"] * float(np.sqrt(own["share"]))
         if cause == "reference_noise":
-            return own["std"] * self._noise_gain
+            return own["std"] * self.noise_gain
         if cause in ON_REFERENCE:
             moved = recorded_motion({cause: own}, self._along_x.acceleration,
                                     self.excitation.step_s)
@@ -103,11 +103,11 @@ class Bench:
         return dataclasses.replace(self.excitation, acceleration=acceleration)
 
     @functools.cached_property
-    def _noise_gain(self):
+    def noise_gain(self):
         """RMS of the output for white noise of unit RMS on the reference's samples."""
         rate = self.logger.reference_rate_hz or self.excitation.rate_hz
         s = 2j * np.pi * rate * np.linspace(1e-4, 0.5, 20_000)
-        return _rms(np.abs(transfer_function(Sensor(self.core), "x", s)))
+        return _rms(np.abs(transfer_function(Sensor(self.core, self.surroundings), "x", s)))
 
 
 def draw_effects(rng, bench, causes, times_noise=None):

@@ -14,10 +14,11 @@ without differ by the effect alone. In signal order:
 - ``resampling_glitches`` (`rate_hz`): what stands at a stamp is the nearest value of a sampler at
   another rate.
 - ``gain_modulation`` (`depth`, `frequency_hz`, `phase_rad`): gain 1 + depth sin(...).
-- ``gain_by_axis`` (`depth`): gain 1 + depth · (y's output over its RMS).
+- ``gain_by_axis`` (`depth`): gain 1 + depth · (y's output, without its mean, over its RMS).
 - ``multiplicative_noise`` (`depth`, `seed`): gain 1 + depth · white noise.
 - ``loose_contact`` (`share`, `gain`, `seed`): for a share of the time the gain is another.
-- ``delayed_cross_talk`` (`coefficient`, `delay_s`): y's output of a while ago is added.
+- ``delayed_cross_talk`` (`coefficient`, `delay_s`): y's output of a while ago is
+  added, without its mean.
 - ``asymmetric_gain`` (`ratio`): the gain of values below zero, relative to that of those above.
 - ``tanh_saturation`` (`limit`): limit · tanh(y / limit).
 - ``folded_tones`` (`amplitude`, `rates_hz`, `seed`): three tones beyond the Nyquist frequency whose
@@ -84,7 +85,7 @@ def gain(effects, t, other):
     if "gain_modulation" in effects:
         factor *= 1 + effects["gain_modulation"]["depth"] * _sine(effects["gain_modulation"], t)
     if "gain_by_axis" in effects:
-        factor *= 1 + effects["gain_by_axis"]["depth"] * other / np.std(other)
+        factor *= 1 + effects["gain_by_axis"]["depth"] * (other - other.mean()) / other.std()
     if "multiplicative_noise" in effects:
         noise = effects["multiplicative_noise"]
         factor *= 1 + noise["depth"] * np.random.default_rng(noise["seed"]).normal(size=len(t))

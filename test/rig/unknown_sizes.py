@@ -35,13 +35,15 @@ def outside(rng, kind, rate_hz, core, output, sign, catalogue):
         # One of them within what is excited, or both together would look like one.
         ratio, second = float(rng.uniform(0.03, 0.2)), float(rng.uniform(0.55, 0.85))
         return Family(1.0, 3.0, lambda size: {
-            "first_hz": 1.2 * band_hz[1] / size, "second_hz": second * 1.2 * band_hz[1] / size,
+            "first_hz": float(1.2 * band_hz[1] / size),
+            "second_hz": float(second * 1.2 * band_hz[1] / size),
             "damping_ratio": ratio}, most=1.5)
 
     def duffing_mount():
         frequency, ratio = float(band_hz[1] * rng.uniform(0.8, 1.5)), float(rng.uniform(0.05, 0.3))
         return Family(0.02, 0.3, lambda size: {
-            "frequency_hz": frequency, "damping_ratio": ratio, "cubic": size / felt ** 2}, most=1.5)
+            "frequency_hz": frequency, "damping_ratio": ratio, "cubic": float(size / felt ** 2)},
+            most=1.5)
 
     def slew_limit():
         speed = np.abs(np.diff(output)) * rate_hz
