@@ -16,6 +16,7 @@ from .excitation import Excitation, band_noise, multisine, noise_bursts
 from .record import Record, simulate_record
 from .scaling import Bench, draw_effects
 from .sensor import CAUSES, Sensor
+from .unknown import partly_true
 
 RATE_HZ = 2000.0
 EXCITATIONS = ("band_noise", "multisine", "noise_bursts")
@@ -183,7 +184,8 @@ def _draw(rng, seed, causes, kind, excitation_name, times_noise):
         return None
     has_temperature = bool(NEED_TEMPERATURE & set(effects)) or bool(rng.integers(2))
     return HiddenCase(record, sensor, model_in_use(core, effects), set(effects), effects,
-                      float(bench.noise_std), alone, kind, excitation_name, seed, has_temperature)
+                      float(bench.noise_std), alone, kind, excitation_name, seed, has_temperature,
+                      partly_true(effects))
 
 
 def model_in_use(core, effects):

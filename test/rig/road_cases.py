@@ -16,6 +16,7 @@ from .record import simulate_record
 from .road import draw_drive, drive_on_road, turned
 from .scaling import Bench, draw_effects
 from .sensor import CAUSES, SECOND_SET, UNCATALOGUED, Sensor
+from .unknown import partly_true
 
 G = 9.80665  # m/s²
 LATTICE = 0.01 * G  # as phones and cheap sensors have it
@@ -53,6 +54,8 @@ class Surroundings:
     logger : Logger
     lost, jitter : float
         Share of lost sensor messages; scatter of its stamps in intervals.
+    skew_ppm : float
+        Of the sensor's clock.
     """
 
     snr_db: float
@@ -63,6 +66,7 @@ class Surroundings:
     logger: Logger
     lost: float
     jitter: float
+    skew_ppm: float
 
 
 def draw_road_causes(seed, count):
@@ -128,7 +132,7 @@ def _draw(rng, seed, causes, duration_s, times_noise):
             spikes=around.spikes and (around.spikes[0], around.spikes[1] * sensor_noise))
     except FloatingPointError:
         return None
-    besides = _noticeable(besides, bench)
+    besides = {**partly_true(effects), **_noticeable(besides, bench)}
     if around.spikes:
         besides["interference_bursts"] = {}  # short and strong, whatever they are called
     baseline = model_in_use(core, effects)
@@ -142,11 +146,12 @@ def _draw(rng, seed, causes, duration_s, times_noise):
 def _draw_surroundings(rng, causes, rate_hz):
     """The same faults are not there twice: what is hidden is not part of the surroundings."""
     network = str(rng.choice(["bench", "phone", "can"], p=[0.4, 0.3, 0.3]))
-    logger, lost, jitter = Logger(), 0.0, 0.0
+    logger, lost, jitter, skew_ppm = Logger(), 0.0, 0.0, 0.0
     if network == "phone":
         logger = Logger(sensor_rate_hz=float(rate_hz * rng.uniform(0.9, 1.1)),
                         sensor_start_s=float(rng.uniform(0, 1) / rate_hz))
         lost, jitter = float(rng.choice([0.0, 0.003, 0.01])), float(rng.uniform(0, 0.05))
+        skew_ppm = float(rng.choice([0.0, rng.uniform(-40, 40)]))
     elif network == "can":
         logger = Logger(reference_rate_hz=float(rng.choice([50.0, 100.0])),
                         reference_lost=float(rng.choice([0.0, 0.005])))
@@ -156,10 +161,12 @@ def _draw_surroundings(rng, causes, rate_hz):
     around = Surroundings(
         snr_db=float(rng.uniform(30, 60)), reference_snr_db=float(noisy_reference),
         noise_ar=() if colour is None else (colour,), spikes=spikes,
-        lattice=bool(rng.random() < 0.4), logger=logger, lost=lost, jitter=jitter)
+        lattice=bool(rng.random() < 0.4), logger=logger, lost=lost, jitter=jitter,
+        skew_ppm=skew_ppm)
     quiet = {"reference_noise": {"reference_snr_db": np.inf}, "quantization": {"lattice": False},
              "interference_bursts": {"spikes": None}, "dropped_samples": {"lost": 0.0},
              "timestamp_jitter": {"jitter": 0.0}, "sampling_jitter": {"jitter": 0.0},
+             "clock_skew": {"skew_ppm": 0.0}, "time_step": {"skew_ppm": 0.0},
              "held_values": {"lost": 0.0}, "batched_stamps": {"lost": 0.0, "jitter": 0.0}}
     for cause in causes & set(quiet):
         around = dataclasses.replace(around, **quiet[cause])
@@ -210,6 +217,8 @@ def _besides(around, core, rate_hz, reference_noise):
         besides["dropped_samples"] = {"fraction": around.lost}
     if around.jitter:
         besides["timestamp_jitter"] = {"rms_s": around.jitter / rate_hz}
+    if around.skew_ppm:
+        besides["clock_skew"] = {"skew_ppm": around.skew_ppm}
     return besides
 
 

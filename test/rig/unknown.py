@@ -37,6 +37,13 @@ from . import links
 from .oscillator import integrate
 from .path_dependent import slew_limited
 
+# Causes of the catalogue that a diagnosis may rightly name where a kind is there: a part of it.
+PARTLY = {
+    "duffing_mount": ("mounting_resonance",),               # for small motion
+    "batched_stamps": ("time_delay", "timestamp_jitter"),   # its mean and the rest
+    "resampling_glitches": ("sampling_jitter",),            # though it has a pattern
+}
+
 
 def felt_motion(effects, values, step_s, axis):
     """Acceleration of one axis behind the mounts, on the grid."""
@@ -125,6 +132,11 @@ def stamps(effects, stamps_ns):
     place = np.arange(len(stamps_ns))
     last = np.minimum(place // count * count + count - 1, len(stamps_ns) - 1)
     return stamps_ns[last] + 100_000 * (place - last)
+
+
+def partly_true(kinds):
+    """Causes that may be named besides, with no parameters of their own."""
+    return {cause: {} for kind in sorted(kinds) for cause in PARTLY.get(kind, ())}
 
 
 def stretches(rng, count, share, shortest=5, longest=60):
