@@ -15,7 +15,7 @@ def moving_average(values, step_s, length_s, order):
     points = length_s / step_s
     for _ in range(round(order)):
         total = _integral(values)
-        values = (total - links.sample(total, np.arange(len(total)) - points)) / points
+        values = (total - links.delayed(total, points)) / points
     return values
 
 

@@ -19,8 +19,7 @@ def recorded_motion(effects, acceleration, step_s):
         if "reference_low_pass" in effects:
             values = links.low_pass(values, step_s, **effects["reference_low_pass"])
         if "reference_delay" in effects:
-            late = effects["reference_delay"]["delay_s"] / step_s
-            values = links.sample(values, np.arange(len(values)) - late)
+            values = links.delayed(values, effects["reference_delay"]["delay_s"] / step_s)
         result[axis] = values
     return result
 
