@@ -143,14 +143,18 @@ def test_trials_are_unique_and_no_seed_is_in_two_sets():
     assert len({(t.name, t.seed) for p in plans for t in p}) == sum(map(len, plans))
     assert {t.group for t in plans[0]} == set(GROUPS)
     counts = {group: sum(t.group == group for t in plans[0]) for group in GROUPS}
-    assert counts == {"single": 440, "multiple": 60, "clean": 100, "outside": 30,
-                      "without_model": 54, "power": 528}
+    assert counts == {"single": 440, "multiple": 60, "clean": 100, "outside": 190,
+                      "without_model": 54, "power": 528, "second_set": 252,
+                      "road_single": 204, "road_multiple": 40, "road_clean": 60,
+                      "road_outside": 114}
     assert not {t.seed for t in plans[0]} & {t.seed for t in plans[1]}
     assert len(plan(0, ["single"], first=2)) == 44
 
 
 def test_a_diagnoser_that_knows_the_truth_a_silent_and_a_broken_one():
-    trials = [plan(7, [group], first=1)[0] for group in ("clean", "outside", "single")]
+    trials = [plan(7, [group], first=1)[0]
+              for group in ("clean", "outside", "single", "road_outside")]
+    roads = trials.pop()
 
     def knowing(trial):
         def diagnose(pair, model, axis, temperature):
@@ -183,5 +187,45 @@ def test_a_diagnoser_that_knows_the_truth_a_silent_and_a_broken_one():
     assert not score.exact(silence) and not score.wrong(silence)
     failed = run(trials[0], broken)
     assert failed["error"].startswith(("refused: nothing", "crashed: ZeroDivisionError"))
-    page = markdown([*rows, silence, failed], "this test")
-    assert "## Verdicts" in page and "`impact_stop`" in page
+    far = run(roads._replace(times_noise=1.0), silent)
+    assert far["causes"] == ("gain_modulation",) and not score.unexplained(far)
+    page = markdown([*rows, silence, failed, far], "this test")
+    assert "## Verdicts" in page and "`gain_modulation`" in page and "road, outside" in page
+
+
+def test_undecided_names_nothing():
+    judged = {group: score.right(row(group, causes, verdict="undecided"))
+              for group, causes in {"clean": (), "outside": ("moving_delay",),
+                                    "road_clean": (), "road_outside": ("lever_arm",),
+                                    "single": ("offset",), "second_set": ("backlash",),
+                                    "road_single": ("offset",), "road_multiple": ("offset",),
+                                    }.items()}
+    assert judged == {"clean": True, "outside": True, "road_clean": True, "road_outside": True,
+                      "single": False, "second_set": False, "road_single": False,
+                      "road_multiple": False}
+    named = row("road_outside", ["lever_arm"], ["offset"], verdict="undecided")
+    assert not score.right(named)
+    assert not score.right(row("clean", [], ["offset"], verdict="undecided"))
+    assert not score.right(row("outside", ["lever_arm"], verdict="consistent"))
+
+
+def test_what_the_surroundings_have_may_be_named_or_not():
+    around = {"besides": {"reference_noise": {"std": 0.1}}}
+    both, one, other = (row("road_single", ["offset"], names, **around) for names in
+                        (["offset", "reference_noise"], ["offset"], ["reference_noise"]))
+    assert [score.right(r) for r in (both, one, other)] == [True, True, False]
+    assert [score.wrong(r) for r in (both, one, other)] == [set(), set(), set()]
+    clean = row("road_clean", [], ["reference_noise"], verdict="explained", **around)
+    assert score.right(clean) and not score.right(clean | {"besides": {}})
+
+
+def test_words_among_the_parameters_and_intervals_in_all():
+    truth = {"corner_hz": 44.0, "order": 2, "family": "bessel"}
+    found = {"corner_hz": {"value": 45.0, "std": 1.0}, "order": {"value": 2, "std": 0.0}}
+    one = row("second_set", ["low_pass_filter"], truth={"low_pass_filter": truth})
+    one["findings"] = {"low_pass_filter": found}
+    far = one | {"findings": {"low_pass_filter": found | {
+        "corner_hz": {"value": 60.0, "std": 1.0}}}}
+    assert set(score.parameter_errors([one])) == {("low_pass_filter", "corner_hz"),
+                                                  ("low_pass_filter", "order")}
+    assert sorted(score.coverage([one, far])) == [False, True, True, True]

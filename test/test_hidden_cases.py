@@ -18,7 +18,12 @@ def rms(values):
     return np.sqrt(np.mean(np.square(values)))
 
 
-@pytest.mark.parametrize("cause", rig.CAUSES + rig.UNCATALOGUED)
+# The rest of the second set and of the unknown kinds are drawn in test_rig_road.py.
+ONLY_HERE = ("stiffness_drift", "quadratic_damping", "impact_stop", "second_resonance",
+             "reference_low_pass", "gain_modulation", "moving_delay", "duffing_mount")
+
+
+@pytest.mark.parametrize("cause", rig.CAUSES + ONLY_HERE)
 def test_effect_stands_out_of_the_noise(cause):
     case = draw_case(3, {cause})
     record = case.record
@@ -38,6 +43,13 @@ def test_effect_stands_out_of_the_noise(cause):
         residual = rms((record.sensor[:, 0] - without)[later])
         stated = np.hypot(case.effect_rms[cause], case.noise_std)
         assert 0.4 < residual / stated < 2.0
+
+
+def test_a_variant_stands_for_its_cause():
+    case = draw_case(3, {"hardening_hysteresis"})
+    assert case.causes == {"hysteresis"}
+    assert case.truth["hysteresis"]["beta"] + case.truth["hysteresis"]["gamma"] < 0
+    assert case.effect_rms["hysteresis"] >= 3 * case.noise_std
 
 
 @pytest.mark.parametrize("kind, excitation", list(zip(KINDS, EXCITATIONS)))
@@ -61,6 +73,9 @@ def test_drawn_sets_of_causes_can_be_told_apart():
     drawn = [draw_causes(seed, 3) for seed in range(300)]
     assert set().union(*drawn) == set(rig.CAUSES)
     assert not any({"core_parameter_shift", "fractional_damping"} <= causes for causes in drawn)
+    drawn = [draw_causes(seed, 3, rig.SECOND_SET) for seed in range(300)]
+    assert set().union(*drawn) == set(rig.SECOND_SET)
+    assert not any({"offset_drift", "thermal_offset"} <= causes for causes in drawn)
 
 
 def test_a_case_is_drawn_again_bit_by_bit():

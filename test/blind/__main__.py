@@ -1,4 +1,4 @@
-"""Run the blind suite on both cores; what is done is kept, so that it can be stopped at any time.
+"""Run the blind suite; what is done is kept, so that it can be stopped at any time.
 
 ``python -m blind``, with ``test`` and the repository's root on the path (`make blind` does so).
 """
@@ -28,10 +28,12 @@ def main():
     parser.add_argument("--seed-set", type=int, default=0,
                         help="which draws: none occurs in two sets (default: %(default)s)")
     parser.add_argument("--first", type=int, help="only so many draws of each cause")
+    parser.add_argument("--limit", type=int, help="only so many cases in all")
+    parser.add_argument("--jobs", type=int, default=2, help="processes (default: %(default)s)")
     parser.add_argument("--output", type=Path, default=ROOT / "docs" / "blind.md")
     arguments = parser.parse_args()
     groups = GROUPS if "all" in arguments.groups else arguments.groups
-    trials = plan(arguments.seed_set, groups, arguments.first)
+    trials = plan(arguments.seed_set, groups, arguments.first)[:arguments.limit]
     kept = ROOT / "build" / "blind" / f"{sources_hash()}.jsonl"
     rows = completed(kept)
     missing = [trial for trial in trials if key(trial) not in rows]
@@ -39,7 +41,7 @@ def main():
     kept.write_text("".join(json.dumps(row) + "\n" for row in rows.values()))
     # spawned: threads of numerical libraries do not survive a fork
     context = multiprocessing.get_context("spawn")
-    with context.Pool(2, warm_up) as pool, open(kept, "a") as stream:
+    with context.Pool(arguments.jobs, warm_up) as pool, open(kept, "a") as stream:
         done = pool.imap_unordered(run, missing)
         for row in tqdm(done, total=len(trials), initial=len(trials) - len(missing), unit="case"):
             stream.write(json.dumps(row) + "\n")
@@ -77,7 +79,8 @@ def sources_hash():
     folders = ROOT / "frac_accel", ROOT / "test" / "rig"
     paths = [path for folder in folders for path in folder.rglob("*.py")]
     digest = hashlib.sha256()
-    for path in (*sorted(paths), ROOT / "test" / "blind" / "trial.py"):
+    blind = ROOT / "test" / "blind"
+    for path in (*sorted(paths), blind / "plan.py", blind / "trial.py"):
         digest.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
     return digest.hexdigest()[:12]
 

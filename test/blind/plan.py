@@ -3,12 +3,18 @@
 from typing import NamedTuple
 
 import numpy as np
-from rig.hidden import draw_causes
-from rig.sensor import CAUSES, UNCATALOGUED
+from rig.hidden import draw_case, draw_causes
+from rig.road_cases import ROAD_CAUSES, ROAD_VARIANTS, draw_road_case, draw_road_causes
+from rig.sensor import CAUSES, SECOND_SET, UNCATALOGUED
 
-GROUPS = ("single", "multiple", "clean", "outside", "without_model", "power")
+ON_ROADS = ("road_single", "road_multiple", "road_clean", "road_outside")
+GROUPS = ("single", "multiple", "clean", "outside", "without_model", "power", "second_set",
+          *ON_ROADS)
+LAB_VARIANTS = ("hardening_hysteresis", "turned_axes")
 
 PER_CAUSE, CLEAN, MULTIPLE, OUTSIDE_PER_CAUSE, POWER_PER_CAUSE = 20, 100, 60, 10, 24
+SECOND_SET_PER_CAUSE = 12
+ROAD_PER_CAUSE, ROAD_CLEAN, ROAD_MULTIPLE, ROAD_OUTSIDE_PER_CAUSE = 6, 60, 40, 6
 WITHOUT_MODEL_EVERY = 10
 POWER_TIMES_NOISE = 0.03, 10.0
 
@@ -24,7 +30,7 @@ class Trial(NamedTuple):
         Unique.
     seed : int
     causes : tuple of str
-        What is hidden.
+        What is hidden; a variant (`rig.scaling.VARIANTS`) stands for its cause.
     times_noise : float or None
         RMS of the effect over the noise's; None for that of `rig.hidden.draw_case`.
     """
@@ -34,6 +40,11 @@ class Trial(NamedTuple):
     seed: int
     causes: tuple
     times_noise: float | None = None
+
+    def case(self):
+        """The `HiddenCase` that this trial is about, drawn anew."""
+        draw = draw_road_case if self.group in ON_ROADS else draw_case
+        return draw(self.seed, self.causes, times_noise=self.times_noise)
 
 
 def plan(seed_set, groups=GROUPS, first=None):
@@ -65,12 +76,15 @@ def plan(seed_set, groups=GROUPS, first=None):
     # strong and weak ones alternate, so that the first few span the range
     shares = shares[np.argsort(np.arange(POWER_PER_CAUSE) * 7 % POWER_PER_CAUSE)]
     strengths = smallest * (largest / smallest) ** shares
-    multiple = [t for i in range(MULTIPLE) for t in _renumbered(trials(
-        "multiple", draw_causes(base + 20_000 + i, 2 + i % 2), 1, 20_000 + i), i)]
+
+    def several(group, draw, count, offset):
+        return [t for i in range(count) for t in _renumbered(trials(
+            group, draw(base + offset + i, 2 + i % 2), 1, offset + i), i)]
+
     families = {
         "single": single,
         "clean": [clean],
-        "multiple": [multiple],
+        "multiple": [several("multiple", draw_causes, MULTIPLE, 20_000)],
         "outside": [trials("outside", [cause], OUTSIDE_PER_CAUSE, 30_000)
                     for cause in UNCATALOGUED],
         # the same records as with a model
@@ -78,6 +92,14 @@ def plan(seed_set, groups=GROUPS, first=None):
                            for t in family[::WITHOUT_MODEL_EVERY]] for family in (*single, clean)],
         "power": [trials("power", [cause], POWER_PER_CAUSE, 40_000, strengths)
                   for cause in CAUSES],
+        "second_set": [trials("second_set", [cause], SECOND_SET_PER_CAUSE, 50_000)
+                       for cause in (*SECOND_SET, *LAB_VARIANTS)],
+        "road_single": [trials("road_single", [cause], ROAD_PER_CAUSE, 60_000)
+                        for cause in (*ROAD_CAUSES, *ROAD_VARIANTS)],
+        "road_multiple": [several("road_multiple", draw_road_causes, ROAD_MULTIPLE, 70_000)],
+        "road_clean": [trials("road_clean", [], ROAD_CLEAN, 80_000)],
+        "road_outside": [trials("road_outside", [kind], ROAD_OUTSIDE_PER_CAUSE, 90_000)
+                         for kind in UNCATALOGUED],
     }
     chosen = [family[:first] for group in groups for family in families[group]]
     order = [(i / len(family), trial) for family in chosen for i, trial in enumerate(family)]

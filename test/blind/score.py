@@ -50,14 +50,14 @@ def named(row):
     return set(row["findings"])
 
 
-def exact(row):
-    """True where exactly the hidden causes are named."""
-    return row["error"] is None and named(row) == set(row["causes"])
-
-
 def wrong(row):
-    """Names of causes that are not there."""
-    return named(row) - set(row["causes"])
+    """Names of causes that are neither hidden nor part of the surroundings."""
+    return named(row) - set(row["causes"]) - set(row.get("besides", ()))
+
+
+def exact(row):
+    """True where all hidden causes are named and no wrong one."""
+    return row["error"] is None and set(row["causes"]) <= named(row) and not wrong(row)
 
 
 def consistent(row):
@@ -65,15 +65,34 @@ def consistent(row):
     return row["verdict"] == "consistent" and not row["findings"]
 
 
+def quiet(row):
+    """True where nothing is named and no alarm is given: undecided is as good as consistent."""
+    return row["verdict"] in ("consistent", "undecided") and not row["findings"]
+
+
+def answered_without_a_wrong_name(row):
+    """True where there is an answer and what it names is there."""
+    return row["error"] is None and row["verdict"] != "insufficient_data" and not wrong(row)
+
+
 def unexplained(row):
-    """True where physics outside the catalogue is seen and given no name."""
-    return row["verdict"] in ("unexplained", "partly_explained") and not row["findings"]
+    """True where physics outside the catalogue is seen, or left undecided, and given no name.
+
+    What is merely said to be there besides it, and is, may be named.
+    """
+    seen = row["verdict"] in ("unexplained", "partly_explained", "undecided")
+    return row["error"] is None and seen and not wrong(row)
 
 
 def right(row):
-    """Whether a diagnosis is what it should be for its group; None for the power study."""
-    judges = {"single": exact, "multiple": exact, "clean": consistent, "outside": unexplained,
-              "without_model": lambda row: row["error"] is None and not wrong(row)}
+    """Whether a diagnosis is what it should be for its group; None for the power study.
+
+    `undecided` names nothing: right where there is no cause of the catalogue, a miss elsewhere.
+    """
+    judges = {"single": exact, "multiple": exact, "clean": quiet, "outside": unexplained,
+              "without_model": lambda row: row["error"] is None and not wrong(row),
+              "second_set": exact, "road_single": exact, "road_multiple": exact,
+              "road_clean": answered_without_a_wrong_name, "road_outside": unexplained}
     return judges[row["group"]](row) if row["group"] in judges else None
 
 
@@ -111,6 +130,8 @@ def parameter_errors(rows):
     for row in rows:
         for cause, truth in row["truth"].items():
             for name, true in truth.items() if cause in row["findings"] else ():
+                if isinstance(true, str):  # a filter's family is right or wrong, not near
+                    continue
                 entry = collected.setdefault((cause, name), ([], [], [], []))
                 found = row["findings"][cause].get(name, {"value": np.nan, "std": None})
                 error = abs(found["value"] - true)
@@ -126,6 +147,12 @@ def parameter_errors(rows):
                     entry[2].append(error <= 1.96 * std)
     return {key: ParameterErrors(share(value), share(departure), share(covered), len(missing))
             for key, (value, departure, covered, missing) in collected.items()}
+
+
+def coverage(rows):
+    """For each parameter of a rightly named cause, whether its 95 % interval holds the truth."""
+    found = parameter_errors(rows).values()
+    return [hit < entry.covered.successes for entry in found for hit in range(entry.covered.n)]
 
 
 def error_over_oracle(rows):

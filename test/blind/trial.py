@@ -3,12 +3,14 @@
 import time
 
 import numpy as np
-from rig.hidden import draw_case
 
 from frac_accel import SensorModel, simulate
 from frac_accel.core import Oscillator
 from frac_accel.effects import known_effects
 from frac_accel.errors import FracAccelError
+
+# Groups whose correction is judged; the roads' rates and noise are no matter of the sensor.
+CORRECTED = ("single", "multiple")
 
 
 def warm_up():
@@ -32,16 +34,17 @@ def run(trial, diagnose=None):
     """
     if diagnose is None:
         from frac_accel import diagnose
-    case = draw_case(trial.seed, trial.causes, times_noise=trial.times_noise)
+    case = trial.case()
     reference, sensor, temperature = case.samples()
-    row = {**trial._asdict(), "kind": case.kind, "excitation": case.excitation,
+    row = {**trial._asdict(), "causes": tuple(sorted(case.causes)), "hidden": trial.causes,
+           "besides": case.besides, "kind": case.kind, "excitation": case.excitation,
            "samples": len(sensor.stamps_ns), "truth": case.truth, "core": case.baseline.core,
            "strength": {cause: rms / case.noise_std for cause, rms in case.effect_rms.items()},
            "oracle_rmse": oracle_rmse(case), "verdict": None, "error": None, "findings": {},
            "extended_rmse": None, "correction": None}
-    model = None if trial.group == "without_model" else case.model()
     begin = time.process_time()
     try:
+        model = None if trial.group == "without_model" else case.model()
         found = diagnose((reference, sensor), model=model, axis="x", temperature=temperature)
         row["cpu_s"] = time.process_time() - begin
         result = found.as_dict()
@@ -53,7 +56,7 @@ def run(trial, diagnose=None):
     row["verdict"] = result["verdict"]
     row["findings"] = {finding["cause"]: finding["parameters"] for finding in result["findings"]}
     row["extended_rmse"] = _finite(result["extended"]["rmse"])
-    if trial.group in ("single", "multiple") and result["findings"]:
+    if trial.group in CORRECTED and result["findings"]:
         row["correction"] = corrections(case, found.model)
     return row
 
@@ -64,10 +67,11 @@ def oracle_rmse(case):
     Clipping and quantisation act on the noise too: the oracle applies them to what it knows.
     """
     values = case.record.clean[:, 0]
-    if "clipping" in case.truth:
-        values = np.clip(values, case.truth["clipping"]["lower"], case.truth["clipping"]["upper"])
-    if "quantization" in case.truth:
-        step = case.truth["quantization"]["step"]
+    effects = case.sensor.effects
+    if "clipping" in effects:
+        values = np.clip(values, effects["clipping"]["lower"], effects["clipping"]["upper"])
+    if "quantization" in effects:
+        step = effects["quantization"]["step"]
         values = step * np.round(values / step)
     return float(np.sqrt(np.mean(np.square(case.record.sensor[:, 0] - values))))
 

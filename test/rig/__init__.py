@@ -16,10 +16,10 @@ from .excitation import (
     swept_sine,
 )
 from .record import Record, simulate_record
-from .sensor import CAUSES, UNCATALOGUED, Sensor, draw_effect, draw_sensor
+from .sensor import CAUSES, SECOND_SET, UNCATALOGUED, Sensor, draw_effect, draw_sensor
 
 __all__ = [
-    "CAUSES", "UNCATALOGUED", "Excitation", "Record", "Sensor", "band_noise", "draw_effect",
-    "draw_sensor", "exact_output", "multisine", "noise_bursts", "shock", "simulate_record", "sines",
-    "stepped_sine", "swept_sine", "transfer_function",
+    "CAUSES", "SECOND_SET", "UNCATALOGUED", "Excitation", "Record", "Sensor", "band_noise",
+    "draw_effect", "draw_sensor", "exact_output", "multisine", "noise_bursts", "shock",
+    "simulate_record", "sines", "stepped_sine", "swept_sine", "transfer_function",
 ]

@@ -3,30 +3,12 @@
 All but the size is drawn at random once; the size is then set for an effect of a wanted strength.
 """
 
-import dataclasses
-from collections.abc import Callable
-
 import numpy as np
 
-
-@dataclasses.dataclass(frozen=True)
-class Family:
-    """Parameters of one cause over its size.
-
-    Attributes
-    ----------
-    smallest, largest : float
-        Physical bounds of the size.
-    parameters : callable
-        Size -> parameters.
-    most : float
-        Largest effect, as a share of the signal's RMS.
-    """
-
-    smallest: float
-    largest: float
-    parameters: Callable[[float], dict]
-    most: float = 0.3
+from .family import Family
+from .second_set_sizes import second_set
+from .sensor import UNCATALOGUED
+from .unknown_sizes import outside
 
 
 def draw_family(rng, cause, rate_hz, core, output):
@@ -87,21 +69,6 @@ def draw_family(rng, cause, rate_hz, core, output):
         return Family(1e-6 * level, level, lambda size: {"frequency_hz": frequency,
                                                          "amplitude": size})
 
-    def impact_stop():
-        sides = rng.choice(["lower", "upper", "both"])
-        stiffness = float(10 ** rng.uniform(1.3, 2.3))
-        places = {"lower": lambda size: quantile(size), "upper": lambda size: quantile(1 - size)}
-        return Family(20 / len(output), 0.3, lambda size: {
-            "stiffness": stiffness,
-            **{side: place(size) for side, place in places.items() if sides in (side, "both")}})
-
-    def modulation(name, smallest, largest):
-        # Several periods in the record: a slower one would be a drift.
-        frequency = float(rng.uniform(4, 200) / duration)
-        phase = float(rng.uniform(0, 2 * np.pi))
-        return Family(smallest, largest, lambda size: {name: size, "frequency_hz": frequency,
-                                                       "phase_rad": phase})
-
     def low_pass_lag():
         return Family(1.0, 20.0, lambda size: {"corner_hz": rate_hz / size})
 
@@ -130,8 +97,9 @@ def draw_family(rng, cause, rate_hz, core, output):
         # Stamps stay in order: half an interval is more than four times the scatter.
         "timestamp_jitter": lambda: single("rms_s", 2e-8, 0.12 / rate_hz),
         "dropped_samples": lambda: single("fraction", 0.002, 0.05),
-        "impact_stop": impact_stop,
-        "gain_modulation": lambda: modulation("depth", 1e-6, 0.3),
-        "moving_delay": lambda: modulation("amplitude_s", 1e-5 / rate_hz, 2 / rate_hz),
     }
-    return families[cause]()
+    if cause in families:
+        return families[cause]()
+    if cause in UNCATALOGUED:
+        return outside(rng, cause, rate_hz, core, output, sign, families)
+    return second_set(rng, cause, rate_hz, core, output, sign)

@@ -5,6 +5,8 @@ The rig never simulates with it: it is what the rig's error is measured against.
 
 import numpy as np
 import scipy.fft
+from scipy.optimize import brentq
+from scipy.special import factorial
 
 from .excitation import smooth_step
 
@@ -18,17 +20,52 @@ def transfer_function(sensor, axis, s):
         w = 2 * np.pi * effects["mounting_resonance"]["frequency_hz"]
         ratio = effects["mounting_resonance"]["damping_ratio"]
         response = response * (2 * ratio * w * s + w ** 2) / (s ** 2 + 2 * ratio * w * s + w ** 2)
+    if "two_mounts" in effects:
+        mounts = effects["two_mounts"]
+        for name in ("first_hz", "second_hz"):
+            w, ratio = 2 * np.pi * mounts[name], mounts["damping_ratio"]
+            passed = 2 * ratio * w * s + w ** 2
+            response = response * passed / (s ** 2 + passed)
+    if "second_resonance" in effects:
+        mode = effects["second_resonance"]
+        w = 2 * np.pi * mode["frequency_hz"]
+        share = mode["share"]
+        response = response * ((1 - share) + share * w ** 2 / (
+            s ** 2 + 2 * mode["damping_ratio"] * w * s + w ** 2))
     if "ac_coupling" in effects:
         response = response * s / (s + 2 * np.pi * effects["ac_coupling"]["corner_hz"])
     if "low_pass_lag" in effects:
         w = 2 * np.pi * effects["low_pass_lag"]["corner_hz"]
         response = response * w / (s + w)
+    if "low_pass_filter" in effects:
+        response = response * _low_pass_filter(s, **effects["low_pass_filter"])
+    if "linear_phase_filter" in effects:
+        boxcar = effects["linear_phase_filter"]
+        x = s * boxcar["length_s"]
+        response = response * (-np.expm1(-x) / x) ** boxcar["order"]
     if "time_delay" in effects:
         response = response * np.exp(-s * effects["time_delay"]["delay_s"])
     return response * effects.get("sensitivity_error", {"gain": 1.0})["gain"]
 
 
+def _low_pass_filter(s, corner_hz, order, family):
+    """From the closed forms: Butterworth's poles on a circle, Bessel's reverse polynomial."""
+    x = s / (2 * np.pi * corner_hz)
+    if family == "butterworth":
+        angles = np.pi * (2 * np.arange(order) + order + 1) / (2 * order)
+        return 1 / np.prod([x - np.exp(1j * angle) for angle in angles], axis=0)
+    k = np.arange(order + 1)
+    coefficients = factorial(2 * order - k) / (
+        2.0 ** (order - k) * factorial(k) * factorial(order - k))
+    bessel = np.polynomial.Polynomial(coefficients)
+    # scaled for half the power at the corner
+    scale = brentq(lambda w: 2 * coefficients[0] ** 2 - abs(bessel(1j * w)) ** 2, 0.1, 10.0)
+    return coefficients[0] / bessel(scale * x)
+
+
 def _core_response(core, s):
+    if core["type"] == "gain":
+        return np.full(np.shape(s), core["sensitivity"], complex)
     if core["type"] == "oscillator":
         w, order = 2 * np.pi * core["natural_frequency_hz"], core["damping_order"]
         damping = 2 * core["damping_ratio"] * w ** (2 - order) * s ** order

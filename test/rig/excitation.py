@@ -40,14 +40,16 @@ class Excitation:
 class Grid:
     """Time axis of an excitation; t = 0 is the record's first sample."""
 
-    def __init__(self, rate_hz, duration_s, lead_s=0.0, oversampling=64):
-        if oversampling < 64 or oversampling % 2:
-            raise ValueError(f"oversampling {oversampling}: expected an even number from 64")
+    def __init__(self, rate_hz, duration_s, lead_s=0.0, oversampling=64, least=64,
+                 tail_samples=TAIL_SAMPLES):
+        """`least` oversampling may be below 64 only where the content ends far below `rate_hz`."""
+        if oversampling < least or oversampling % 2:
+            raise ValueError(f"oversampling {oversampling}: expected an even number from {least}")
         self.rate_hz, self.oversampling = rate_hz, oversampling
         self.samples = round(duration_s * rate_hz)
         lead = int(np.ceil(lead_s * rate_hz))
         self.start = lead * oversampling
-        self.points = (lead + self.samples + TAIL_SAMPLES) * oversampling + 1
+        self.points = (lead + self.samples + tail_samples) * oversampling + 1
         self.grid_rate_hz = rate_hz * oversampling
         # Ramp: the lead, or a tenth of the record.
         self.ramp_s = (lead if lead else max(64, self.samples // 10)) / rate_hz

@@ -12,20 +12,29 @@ import dataclasses
 
 import numpy as np
 
-from .effect_sizes import draw_family
 from .excitation import Excitation, band_noise, multisine, noise_bursts
 from .record import Record, simulate_record
+from .scaling import Bench, draw_effects
 from .sensor import CAUSES, Sensor
+from .unknown import partly_true
 
 RATE_HZ = 2000.0
-FEWEST_TIMES_NOISE = 3.0
-MOST_TIMES_NOISE = 100.0
 EXCITATIONS = ("band_noise", "multisine", "noise_bursts")
 TEMPERATURE_RATE_HZ = 20.0
-ON_STAMPS = {"timestamp_jitter", "dropped_samples"}
+NEED_TEMPERATURE = {"temperature_sensitivity", "thermal_offset"}
 
-# The second one of these says what the first one says: the truth would not be unique.
-INSEPARABLE = ({"core_parameter_shift", "fractional_damping"},)
+# Of these, one says what the other says, or the rig cannot do both: no truth would be unique.
+INSEPARABLE = (
+    {"core_parameter_shift", "fractional_damping"},
+    {"core_parameter_shift", "stiffness_drift"}, {"fractional_damping", "stiffness_drift"},
+    {"coulomb_friction", "stiffness_drift"},
+    {"time_delay", "reference_delay"}, {"ac_coupling", "reference_ac_coupling"},
+    {"low_pass_lag", "low_pass_filter"}, {"low_pass_filter", "linear_phase_filter"},
+    {"low_pass_lag", "linear_phase_filter"}, {"time_delay", "linear_phase_filter"},
+    {"mounting_resonance", "second_resonance"},
+    {"cross_axis_sensitivity", "misalignment"}, {"sensitivity_error", "misalignment"},
+    {"timestamp_jitter", "sampling_jitter"}, {"offset_drift", "thermal_offset"},
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,18 +61,22 @@ class HiddenCase:
     ----------
     record : Record
     sensor, baseline : Sensor
-        The truth, and the same without its effects.
+        The truth, and the model in use: the same without its effects.
     causes : set of str
     truth : dict
         Cause -> parameters.
     noise_std : float
-        Noise of axis x [output units].
+        Noise of axis x [output units]; what the reference's noise and the lattice make of it
+        included.
     effect_rms : dict
         Cause -> RMS of its effect alone on axis x [output units].
     kind, excitation : str
     seed : int
     has_temperature : bool
         True where the record comes with a temperature topic.
+    besides : dict
+        Cause -> parameters of what is truly there as well, as part of the surroundings: a diagnosis
+        may name it or not.
     """
 
     record: Record
@@ -77,6 +90,7 @@ class HiddenCase:
     excitation: str
     seed: int
     has_temperature: bool
+    besides: dict = dataclasses.field(default_factory=dict)
 
     def samples(self):
         """Reference and sensor as `Samples`, and stamps and °C of the temperature or None."""
@@ -85,7 +99,8 @@ class HiddenCase:
         record = self.record
         temperature = None
         if self.has_temperature:
-            every = round(RATE_HZ / TEMPERATURE_RATE_HZ)
+            interval_s = np.median(np.diff(record.stamps_ns)) * 1e-9
+            every = max(1, round(1 / (interval_s * TEMPERATURE_RATE_HZ)))
             temperature = record.stamps_ns[::every], record.temperature_c[::every]
         return (Samples.of(record.stamps_ns, record.reference),
                 Samples.of(record.sensor_stamps_ns, record.sensor), temperature)
@@ -109,11 +124,11 @@ class HiddenCase:
         return SensorModel.from_dict(self.baseline.to_model())
 
 
-def draw_causes(seed, count):
+def draw_causes(seed, count, among=CAUSES):
     """`count` different causes that can be told apart."""
     rng = np.random.default_rng([seed, count])
     while True:
-        causes = set(rng.choice(CAUSES, count, replace=False).tolist())
+        causes = set(rng.choice(among, count, replace=False).tolist())
         if not any(pair <= causes for pair in INSEPARABLE):
             return causes
 
@@ -125,7 +140,8 @@ def draw_case(seed, causes=(), kind=None, excitation=None, times_noise=None):
     ----------
     seed : int
     causes : iterable of str
-        Of `CAUSES` and `UNCATALOGUED`; none for a sensor that is as modelled.
+        Of `CAUSES`, `SECOND_SET`, `VARIANTS` and `UNCATALOGUED`; none for a sensor that is as
+        modelled.
     kind : str, optional
         Of `KINDS`; default: drawn.
     excitation : str, optional
@@ -153,88 +169,28 @@ def _draw(rng, seed, causes, kind, excitation_name, times_noise):
     """One draw; None where an effect is too small, or more than the sensor survives."""
     core, snr_db = _draw_core(rng, KINDS[kind])
     excitation = _draw_excitation(rng, excitation_name)
-    along_x = _axis_x_only(excitation)
-    temperature_c = _draw_temperature(rng, excitation.samples)
-
-    def output(effects):
-        """Noise-free values of axis x, with every sample in its place."""
-        effects = {cause: effects[cause] for cause in effects if cause not in ON_STAMPS}
-        moved = excitation if "cross_axis_sensitivity" in effects else along_x
-        try:
-            record = simulate_record(Sensor(core, effects), moved, temperature_c=temperature_c)
-        except FloatingPointError:  # more than the spring can hold
-            return np.full(excitation.samples, np.inf)
-        return record.sensor[:, 0]
-
-    clean = output({})
-    noise_std = clean.std() * 10 ** (-snr_db / 20)
-
-    def effect_rms(cause, effects, others=()):
-        """RMS of what a cause adds to the other causes."""
-        others = {other: effects[other] for other in others}
-        without = output(others) if others else clean
-        if cause == "timestamp_jitter":
-            return _rms(np.gradient(without) * RATE_HZ) * effects[cause]["rms_s"]
-        if cause == "dropped_samples":
-            return _rms(np.diff(without)) * float(np.sqrt(effects[cause]["fraction"]))
-        return _rms(output({**others, cause: effects[cause]}) - without)
-
-    def strong_enough(effect):
-        return effect < np.inf and (times_noise or effect >= FEWEST_TIMES_NOISE * noise_std)
-
-    effects, alone = {}, {}
-    for cause in CAUSES + tuple(causes - set(CAUSES)):
-        if cause not in causes:
-            continue
-        family = draw_family(rng, cause, RATE_HZ, core, clean)
-        def of_size(parameters, cause=cause):
-            return effect_rms(cause, {cause: parameters})
-
-        if times_noise:
-            wanted = times_noise * noise_std
-        else:
-            smallest = of_size(family.parameters(family.smallest))
-            wanted = _draw_wanted(rng, cause, smallest, noise_std, family.most * clean.std())
-        effects[cause], alone[cause] = _scaled(family, of_size, wanted)
-        if not strong_enough(alone[cause]):
-            return None
-    # One effect can hide another: a smaller gain never reaches the limits.
-    if len(causes) > 1 and not all(
-            strong_enough(effect_rms(cause, effects, causes - {cause})) for cause in causes):
+    temperature_c = draw_temperature(rng, excitation.samples)
+    bench = Bench(core, excitation, temperature_c)
+    bench.noise_std = bench.clean.std() * 10 ** (-snr_db / 20)
+    drawn = draw_effects(rng, bench, causes, times_noise)
+    if drawn is None:
         return None
+    effects, alone = drawn
     sensor = Sensor(core, effects)
     try:
-        record = simulate_record(sensor, excitation, rng, noise_std=noise_std,
+        record = simulate_record(sensor, excitation, rng, noise_std=bench.noise_std,
                                  temperature_c=temperature_c)
     except FloatingPointError:  # another axis moves more than its spring can hold
         return None
-    has_temperature = "temperature_sensitivity" in causes or bool(rng.integers(2))
-    return HiddenCase(record, sensor, Sensor(core), causes, effects, float(noise_std), alone, kind,
-                      excitation_name, seed, has_temperature)
+    has_temperature = bool(NEED_TEMPERATURE & set(effects)) or bool(rng.integers(2))
+    return HiddenCase(record, sensor, model_in_use(core, effects), set(effects), effects,
+                      float(bench.noise_std), alone, kind, excitation_name, seed, has_temperature,
+                      partly_true(effects))
 
 
-def _draw_wanted(rng, cause, smallest, noise_std, most):
-    """RMS that an effect is to have; `smallest` is what its bounds leave at least."""
-    low = max(1.1 * FEWEST_TIMES_NOISE * noise_std, smallest)
-    high = max(MOST_TIMES_NOISE * noise_std, 3 * low)
-    if cause == "time_delay":  # delays of whole samples are common
-        high = most
-    return np.exp(rng.uniform(np.log(low), np.log(max(low, min(high, most)))))
-
-
-def _scaled(family, effect_rms, wanted):
-    """Parameters and the effect's RMS: as wanted within 10 %, or as near as the bounds allow."""
-    low, high = np.log(family.smallest), np.log(family.largest)
-    place = (low + high) / 2
-    for _ in range(12):
-        parameters = family.parameters(float(np.exp(place)))
-        found = effect_rms(parameters)
-        if abs(np.log(max(found, 1e-300) / wanted)) < 0.1:
-            break
-        low, high = (low, place) if found > wanted else (place, high)
-        nearer = place + np.log(wanted / max(found, 1e-300)) if np.isfinite(found) else np.nan
-        place = nearer if low < nearer < high else (low + high) / 2
-    return parameters, found
+def model_in_use(core, effects):
+    """The sensor without its effects, and with what a wrong model has besides."""
+    return Sensor(core, effects.get("wrong_model", {"effect": {}})["effect"])
 
 
 def _draw_core(rng, kind):
@@ -262,14 +218,7 @@ def _draw_excitation(rng, name) -> Excitation:
     return noise_bursts(rng, RATE_HZ, duration_s, band_hz, levels, amplitude)
 
 
-def _axis_x_only(excitation):
-    """The rig spends no time on an axis at rest."""
-    acceleration = np.zeros_like(excitation.acceleration)
-    acceleration[0] = excitation.acceleration[0]
-    return dataclasses.replace(excitation, acceleration=acceleration)
-
-
-def _draw_temperature(rng, samples):
+def draw_temperature(rng, samples):
     """A smooth course between 10 and 50 °C that is no straight line in time."""
     t = np.linspace(0, 1, samples)
     course = rng.uniform(-1, 1) * t + rng.uniform(0.3, 1) * np.sin(
@@ -277,6 +226,3 @@ def _draw_temperature(rng, samples):
     course = (course - course.min()) / np.ptp(course)
     return rng.uniform(10, 25) + rng.uniform(10, 25) * course
 
-
-def _rms(values):
-    return float(np.sqrt(np.mean(np.square(values))))

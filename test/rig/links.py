@@ -49,6 +49,22 @@ def difference_equation(values, points_per_sample, numerator, denominator):
     return y.ravel()[:len(values)]
 
 
+def delayed(values, points):
+    """Values of `points` grid steps ago, not necessarily whole, by the polynomial as in `sample`.
+
+    Rest before the grid; its last four values hold on where they would be of later.
+    """
+    whole = int(np.floor(points))
+    place = whole + 1 - points
+    nodes = np.arange(1 - LAGRANGE_POINTS // 2, LAGRANGE_POINTS // 2 + 1)
+    weights = [np.prod([(place - k) / (j - k) for k in nodes if k != j]) for j in nodes]
+    ahead = nodes[-1]
+    padded = np.concatenate([np.zeros(whole + LAGRANGE_POINTS), values,
+                             np.full(ahead, values[-1])])
+    first = LAGRANGE_POINTS - 1 + nodes[0]  # where the first value's first node is
+    return np.correlate(padded, weights, mode="valid")[first:first + len(values)]
+
+
 def sample(values, index):
     """Values at real-valued grid positions, by the polynomial through the eight nearest points.
 

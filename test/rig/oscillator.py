@@ -18,6 +18,10 @@ sticks until the other forces exceed the Coulomb level.
 
 A stop is a further spring, :math:`\kappa` times as stiff, that acts on what q exceeds the stop's
 place by; a step is split where q comes to it or leaves it.
+
+With a drift, :math:`\omega_0 (1 + r t)` stands in every place of :math:`\omega_0`; quadratic
+damping adds :math:`d\, q' |q'| / \omega_0^2` to the spring's bracket. Both are taken into the
+iteration that solves for the nonlinear spring, on top of the constant linear part.
 """
 
 import dataclasses
@@ -44,7 +48,8 @@ class Motion:
 
 def integrate(acceleration, step_s, natural_frequency_hz, damping_ratio, damping_order=1.0,
               sensitivity=1.0, alpha2=0.0, alpha3=0.0, coulomb_level=0.0,
-              hysteresis=(0.0, 0.0, 0.0), stop=(-np.inf, np.inf, 0.0)):
+              hysteresis=(0.0, 0.0, 0.0), stop=(-np.inf, np.inf, 0.0), quadratic_damping=0.0,
+              drift=(0.0, 0.0)):
     """Integrate the equation at the top of this file.
 
     Parameters
@@ -58,6 +63,11 @@ def integrate(acceleration, step_s, natural_frequency_hz, damping_ratio, damping
     stop : tuple of float
         Places of the lower and the upper stop [output units], and their stiffness over the spring's
         (kappa).
+    quadratic_damping : float
+        d [1/output units].
+    drift : tuple of float
+        Rate r of the natural frequency [1/s] and the time t of the grid's first point [s]; needs
+        classical damping and no friction.
 
     Returns
     -------
@@ -65,13 +75,17 @@ def integrate(acceleration, step_s, natural_frequency_hz, damping_ratio, damping
     """
     if len(acceleration) % 2 == 0:
         raise ValueError(f"{len(acceleration)} grid points: expected an odd number")
+    if drift[0] and (damping_order != 1 or coulomb_level):
+        raise ValueError("a drifting natural frequency needs classical damping and no friction")
     natural = 2 * np.pi * natural_frequency_hz
     derivative = diffusive_derivative(
         damping_order, 1 / (len(acceleration) * step_s), max(natural, 0.05 / step_s))
     physics = np.array([natural ** 2, 2 * damping_ratio * natural ** (2 - damping_order),
                         derivative.low, derivative.high, alpha2, alpha3, coulomb_level,
-                        *hysteresis, *stop])
+                        *hysteresis, *stop, quadratic_damping, *drift])
     force = sensitivity * np.ascontiguousarray(acceleration, dtype=float)
+    if drift[0]:
+        force *= (1 + drift[0] * (drift[1] + step_s * np.arange(len(force)))) ** 2
     q, v = _integrate(force, 2 * step_s, derivative.acts_on_velocity, derivative.rates,
                       derivative.weights, physics)
     if not np.isfinite(q[-1]):
@@ -168,10 +182,15 @@ def _at(values, index):
 
 
 @numba.njit(cache=True)
-def _restoring(q, z, physics):
-    """Restoring force over the stiffness, without its linear part and without friction."""
+def _restoring(q, v, z, now, physics):
+    """Restoring force over the stiffness, without its constant linear part and friction."""
     beyond = min(q - physics[10], 0.0) + max(q - physics[11], 0.0)
-    return q * q * (physics[4] + physics[5] * q) + physics[7] * z + physics[12] * beyond
+    force = q * q * (physics[4] + physics[5] * q) + physics[7] * z + physics[12] * beyond
+    if physics[14] != 0:
+        more = physics[14] * now  # relative change of the natural frequency
+        force = ((1 + more) ** 2 * force + (2 + more) * more * q
+                 + more * physics[1] / physics[0] * v)
+    return force + physics[13] * v * abs(v) / physics[0]
 
 
 @numba.njit(cache=True)
@@ -187,7 +206,7 @@ def _drive(force, q, v, z, phi, weights, on_velocity, physics):
     else:
         memory += low * q + high * v
         mass = 1.0
-    return (stiffness * (force - q - _restoring(q, z, physics)) - damping * memory) / mass
+    return (stiffness * (force - q - _restoring(q, v, z, 0.0, physics)) - damping * memory) / mass
 
 
 @numba.njit(cache=True, fastmath={"reassoc", "contract"})
@@ -208,7 +227,8 @@ def _weighted_memory(phi, seen):
 
 
 @numba.njit(cache=True)
-def _solve(length, state, phi, slip, force_middle, force_end, prepared, on_velocity, physics):
+def _solve(now, length, state, phi, slip, force_middle, force_end, prepared, on_velocity,
+           physics):
     """q'' over one step as the coefficients of its parabola, and z in the middle and at the end."""
     stiffness, damping, low, high = physics[0], physics[1], physics[2], physics[3]
     q0, v0, u0, z0 = state
@@ -226,7 +246,8 @@ def _solve(length, state, phi, slip, force_middle, force_end, prepared, on_veloc
     known_end = (stiffness * (force_end - friction - q0 - length * v0)
                  - damping * end - matrix[1, 0] * u0)
     determinant = matrix[0, 1] * matrix[1, 2] - matrix[0, 2] * matrix[1, 1]
-    nonlinear = physics[4] != 0 or physics[5] != 0 or physics[7] != 0 or physics[12] != 0
+    nonlinear = (physics[4] != 0 or physics[5] != 0 or physics[7] != 0 or physics[12] != 0
+                 or physics[13] != 0 or physics[14] != 0)
     c1, c2, zm, z1 = 0.0, 0.0, z0, z0
     for _ in range(FIXED_POINT_PASSES if nonlinear else 1):
         right_middle, right_end = known_middle, known_end
@@ -238,8 +259,8 @@ def _solve(length, state, phi, slip, force_middle, force_end, prepared, on_veloc
             if physics[7] != 0:
                 zm = bouc_wen.advance(z0, q0, v0, qm, vm, length / 2, physics[8], physics[9])
                 z1 = bouc_wen.advance(zm, qm, vm, q1, v1, length / 2, physics[8], physics[9])
-            right_middle -= stiffness * _restoring(qm, zm, physics)
-            right_end -= stiffness * _restoring(q1, z1, physics)
+            right_middle -= stiffness * _restoring(qm, vm, zm, now + length / 2, physics)
+            right_end -= stiffness * _restoring(q1, v1, z1, now + length, physics)
         um = (right_middle * matrix[1, 2] - right_end * matrix[0, 2]) / determinant
         u1 = (right_end * matrix[0, 1] - right_middle * matrix[1, 1]) / determinant
         before1, before2 = c1, c2
@@ -341,7 +362,8 @@ def _integrate(grid, step, on_velocity, rates, weights, physics):
                 continue
             prepared = whole if split == 0 else _prepare(length, on_velocity, rates, weights,
                                                          physics)
-            c1, c2, zm, z1 = _solve(length, state, phi, slip, force_middle, grid[index + 2],
+            now = physics[15] + (index / 2 + position) * step
+            c1, c2, zm, z1 = _solve(now, length, state, phi, slip, force_middle, grid[index + 2],
                                     prepared, on_velocity, physics)
             share = 2.0
             if has_friction and split < MAX_SPLITS - 1:
@@ -353,7 +375,7 @@ def _integrate(grid, step, on_velocity, rates, weights, physics):
             if share < 1:
                 length *= share
                 prepared = _prepare(length, on_velocity, rates, weights, physics)
-                c1, c2, zm, z1 = _solve(length, state, phi, slip,
+                c1, c2, zm, z1 = _solve(now, length, state, phi, slip,
                                         _at(grid, index + 2 * position + left * share),
                                         _at(grid, index + 2 * (position + left * share)),
                                         prepared, on_velocity, physics)

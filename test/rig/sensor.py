@@ -22,12 +22,37 @@ CAUSES = (
     "timestamp_jitter", "dropped_samples",
 )
 
+# Causes of measured records (design: second set), in the same order.
+#   impact_stop   acts where q is beyond `gap`: above it where it is positive, below it where it is
+#                 negative
+#   backlash      `gap` is the whole width of the play
+#   misalignment  the sensor's axes seen from the reference's: R = Rz(yaw) Ry(pitch) Rx(roll) turns
+#                 a vector in the sensor's axes into the reference's
+#   interference_bursts  `rms` is that within a burst
+SECOND_SET = (
+    "misalignment",
+    "stiffness_drift", "quadratic_damping", "impact_stop", "backlash", "second_resonance",
+    "low_pass_filter", "linear_phase_filter",
+    "time_step", "sampling_jitter",
+    "gain_step", "thermal_offset", "offset_drift", "offset_step", "interference_bursts",
+    "reference_ac_coupling", "reference_low_pass", "reference_delay", "reference_noise",
+)
+
+# They change what was recorded of the motion, and not what the sensor feels.
+ON_REFERENCE = ("reference_ac_coupling", "reference_low_pass", "reference_delay",
+                "reference_noise")
+
 # Physics that no cause of the package describes: a diagnosis may not give it one of the names
-# above. A sensor model cannot say it either, so `to_model` leaves it out.
-#   impact_stop      lower and/or upper [output units]: its place; stiffness: over the spring's
-#   gain_modulation  gain 1 + depth sin(2 pi frequency_hz t + phase_rad), t from the record's start
-#   moving_delay     delay amplitude_s sin(2 pi frequency_hz t + phase_rad)
-UNCATALOGUED = ("impact_stop", "gain_modulation", "moving_delay")
+# above. A sensor model cannot say it either, so `to_model` leaves it out. What each one is and its
+# parameters stand in `unknown.py`; besides, each may have `begins_s` [s], before which it is not
+# there.
+UNCATALOGUED = (
+    "gain_modulation", "moving_delay",
+    "two_mounts", "duffing_mount", "lever_arm",
+    "slew_limit", "rectification_memory", "tanh_saturation", "asymmetric_gain",
+    "gain_by_axis", "delayed_cross_talk", "multiplicative_noise", "loose_contact", "held_values",
+    "folded_tones", "wandering_offset", "resampling_glitches", "batched_stamps", "wrong_model",
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,7 +62,7 @@ class Sensor:
     Attributes
     ----------
     core : dict
-        As in the file, with its `type`.
+        As in the file, with its `type`; `gain` is flat, with its `sensitivity`.
     effects : dict of str to dict
         Cause -> parameters; their order does not matter, the signal's order is fixed.
     axes : dict of str to dict
@@ -50,7 +75,7 @@ class Sensor:
 
     def __post_init__(self):
         for effects in (self.effects, *(a.get("effects", {}) for a in self.axes.values())):
-            unknown = set(effects) - {*CAUSES, *UNCATALOGUED}
+            unknown = set(effects) - {*CAUSES, *SECOND_SET, *UNCATALOGUED}
             if unknown:
                 raise ValueError(f"unknown causes {sorted(unknown)}")
 
@@ -60,7 +85,7 @@ class Sensor:
         return own.get("core", self.core), own.get("effects", self.effects)
 
     def to_model(self):
-        """Content of the sensor-model file that says the same."""
+        """Content of the sensor-model file that says the same, but for the reference's faults."""
         model = {"schema": "frac_accel/sensor_model/1", "core": self.core,
                  "effects": _as_list(self.effects)}
         if self.axes:
@@ -72,7 +97,9 @@ class Sensor:
 
 
 def _as_list(effects):
-    return [{"cause": cause, **effects[cause]} for cause in CAUSES if cause in effects]
+    """In the order of the lists; what is the reference's is not the sensor's."""
+    return [{"cause": cause, **effects[cause]} for cause in (*CAUSES, *SECOND_SET)
+            if cause in effects and cause not in ON_REFERENCE]
 
 
 def draw_sensor(rng, rate_hz, kind="classical", effects=(), level=1.0,
