@@ -5,6 +5,7 @@ import functools
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import binary_erosion
 
 from ..bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
 from ..core import Oscillator
@@ -27,6 +28,8 @@ __all__ = ["Diagnosis", "Finding", "diagnose"]
 _FEWEST = 512
 # Coefficients of a classical core with its delay: what the excitation must at least be good for.
 _COEFFICIENTS = 4
+# Samples around one that does not count whose residual is not searched for spikes.
+_EDGE = 4
 # Share of its power in which a signal must follow the model the wrong way round, and the share of
 # what is left the right way round that may be left then, for the pair to count as exchanged.
 _ALIKE = 0.5
@@ -139,7 +142,9 @@ def _in_axes_of_reference(record, source, axis, temperature):
 def _without_spikes(engine, used, stray, reference):
     """Engine whose fits leave out what stands out of the residual, too; and all that they do."""
     first = engine(used=used)
-    more = used & spikes(first.search.fit(first.search.base).residual, reference)
+    # where samples do not count the residual is 0, and steps at their edges are no spikes
+    inside = binary_erosion(first.problem.used, iterations=_EDGE)
+    more = inside & spikes(first.search.fit(first.search.base).residual, reference)
     return (engine(used=used & ~more) if more.any() else first), stray | more
 
 
