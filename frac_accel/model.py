@@ -26,7 +26,7 @@ class AxisModel:
 
     Attributes
     ----------
-    core : Oscillator, Arx or FractionalTransferFunction
+    core : Oscillator, Gain, Arx or FractionalTransferFunction
         Linear core as the file gives it.
     effects : tuple of Effect
         In signal order.
@@ -98,7 +98,7 @@ class SensorModel:
 
     Parameters
     ----------
-    core : Oscillator, Arx or FractionalTransferFunction
+    core : Oscillator, Gain, Arx or FractionalTransferFunction
         Core of all three axes.
     effects : iterable of Effect
         Effects on all three axes.
@@ -121,6 +121,10 @@ class SensorModel:
         self.axes = tuple(self._own.get(name, self._common) for name in AXES)
         self._stages = _sample_stages(self.axes)
         for name, axis in zip(AXES, self.axes):
+            for effect in axis.effects:
+                if not effect.acts_on(axis.core):
+                    raise ModelError(f"effects: {effect.cause} given with a core of type "
+                                     f"{axis.core.type}, expected an oscillator")
             axis.effective_core.require_stable(f"axes.{name}.core" if name in self._own else "core")
 
     @property

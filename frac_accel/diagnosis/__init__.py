@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
-from ..core import Oscillator
+from ..core import Gain, Oscillator
 from ..effects import known_effects
 from ..errors import FracAccelError, IdentificationError
 from ..identification.excitation import learning_length, require_excitation
@@ -107,7 +107,8 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     loose = _left_open(model.axis(axis), stds, 1.25 * found.jitter_rms_s / np.sqrt(found.samples))
     engine = functools.partial(
         Engine, record, column, model, base={cause: entry.effect for cause, entry in loose.items()},
-        candidates=[cause for cause, effect in known_effects().items() if not effect.read_off],
+        candidates=[cause for cause, effect in known_effects().items()
+                    if not effect.read_off and effect.acts_on(model.axis(axis).core)],
         log=progress, step=found.step, limit=limit)
     engine, stray = _without_spikes(engine, used, stray, record.reference[:, column])
     if stray.any():
@@ -153,8 +154,9 @@ def _stated(model, axis):
     """Standard uncertainties that a model states of its core, delay and offset."""
     own = model.axis(axis)
     stated = model.metadata.get("uncertainties")
-    if not isinstance(stated, dict) or not isinstance(own.core, Oscillator) \
-            or own.core.damping_order != 1 or any(effect.restates_core for effect in own.effects):
+    if not isinstance(stated, dict) or not isinstance(own.core, (Oscillator, Gain)) \
+            or getattr(own.core, "damping_order", 1) != 1 \
+            or any(effect.restates_core for effect in own.effects):
         return {}
     return {name: entry["std"] for name, entry in stated.items()
             if isinstance(entry, dict) and isinstance(entry.get("std"), (int, float))

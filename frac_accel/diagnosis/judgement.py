@@ -10,7 +10,7 @@ from scipy.signal import resample_poly
 
 from ..effects import known_effects
 from ..model import AXES, AxisModel, SensorModel, is_link
-from ..parameters import parameter_fields
+from ..parameters import fixed_values, parameter_fields
 from .experiments import separating_experiment
 from .gain import gain
 from .names import cancelling, undetermined
@@ -74,6 +74,8 @@ class Finding:
             field.name: {"value": float(getattr(self.effect, field.name)),
                          "std": float(self.std[field.name]), "unit": field.metadata["unit"]}
             for field in parameter_fields(type(self.effect)) if field.name in self.std}
+        parameters.update({name: {"value": value, "std": 0.0, "unit": ""}
+                           for name, value in fixed_values(self.effect).items()})
         return {"cause": self.cause, "parameters": parameters, "confidence": self.confidence,
                 "confusable_with": self.confusable_with, "evidence": self.evidence,
                 "explanation": self.effect.explanation, "gain": self.gain.as_dict()}

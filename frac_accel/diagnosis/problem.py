@@ -339,6 +339,9 @@ class Problem:
         unknowns = tuple(unknown for cause in effects
                          for unknown in self.unknowns(effects[cause]))
         theta = np.array([_to_theta(getattr(effects[u.cause], u.name), u) for u in unknowns])
+        inside = np.clip(theta, [u.low for u in unknowns], [u.high for u in unknowns])
+        if np.any(inside != theta):
+            theta, effects = inside, self.replaced(effects, unknowns, inside)
         point = self.point(dict(effects), rough)
         return self._improved(Fitted(self, point, unknowns, theta, rough=rough), iterations,
                               hopeless, goal)
@@ -483,6 +486,9 @@ class Problem:
             least, most = self.scales.reach(field, scale)
             low, high = np.log(least), np.log(min(high, most))
         else:
+            if limits["reach"]:
+                least, most = self.scales.reach(field, scale)
+                low, high = max(low, least), min(high, most)
             span = 1e-3 if np.isfinite(low) and np.isfinite(high) else 0
             low, high = low / scale + span, high / scale - span
         return Unknown(effect.cause, field.name, logarithmic, scale, low, high,

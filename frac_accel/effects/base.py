@@ -19,7 +19,7 @@ import numpy as np
 
 from ..core import Oscillator
 from ..errors import ModelError
-from ..parameters import parameter_fields
+from ..parameters import is_varied, parameter_fields
 
 # Place in the signal's way through the sensor, from base to record.
 (MOUNTING, CORE, CONDITIONER, DELAY, GAIN, CROSS_AXIS, OFFSET, DEAD_ZONE, INTERFERENCE, CLIPPING,
@@ -137,7 +137,14 @@ class Effect:
         excited : dict of str to bool
             By axis, whether the reference moves along it.
         """
-        return [field.name for field in parameter_fields(cls)]
+        return [field.name for field in parameter_fields(cls) if is_varied(field)]
+
+    def alternatives(self):
+        """Effects of this cause to go on from that differ in what no fit varies, such as an order.
+
+        Nearest ones are enough: each that fits better is asked for its own.
+        """
+        return []
 
     @classmethod
     def left_open(cls, axis_model, stds, stamps_std_s):
@@ -193,6 +200,12 @@ class Effect:
         """
         reading = shown.reading(seen) if shown is not None else None
         return (shown, reading) if reading is not None else None
+
+    @classmethod
+    def acts_on(cls, core):
+        """Whether a sensor with this core can have this cause: motion and spring need a mass."""
+        return isinstance(core, Oscillator) or (
+            cls.change_core is Effect.change_core and cls.add_force is Effect.add_force)
 
     def pure_delay_s(self):
         """Time [s] by which this effect moves the signal as it is."""
