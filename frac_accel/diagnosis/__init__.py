@@ -142,10 +142,10 @@ def _shown(found, measured):
 
 
 def _classical(record, axis, used):
-    """Classical core identified from the record, what it knows of it (nothing, since any cause has
-    bent it), and the effects that it was identified with."""
+    """Classical core (a gain where no resonance shows) identified from the record, what it knows
+    of it (nothing, since any cause has bent it), and the effects that it was identified with."""
     from ..identification import identify
-    model = identify(dataclasses.replace(record, valid=used), axis, "oscillator").model
+    model = identify(dataclasses.replace(record, valid=used), axis, "classical").model
     return (SensorModel(model.core), dict.fromkeys(_CORE, np.inf),
             {effect.cause: effect for effect in model.effects})
 

@@ -21,9 +21,10 @@ from ..core import Oscillator
 from ..errors import ModelError
 from ..parameters import is_varied, parameter_fields
 
-# Place in the signal's way through the sensor, from base to record.
-(MOUNTING, CORE, CONDITIONER, DELAY, GAIN, CROSS_AXIS, OFFSET, DEAD_ZONE, INTERFERENCE, CLIPPING,
- QUANTIZATION, STAMPS) = range(12)
+# Place in the signal's way through the sensor, from base to record. What happened to the reference
+# on its way to the record is undone before.
+(REFERENCE, MOUNTING, CORE, CONDITIONER, DELAY, GAIN, CROSS_AXIS, OFFSET, DEAD_ZONE, INTERFERENCE,
+ CLIPPING, QUANTIZATION, STAMPS) = range(-1, 12)
 
 
 class Circumstances(NamedTuple):
@@ -94,6 +95,11 @@ class Effect:
     experiment: ClassVar[str] = "Repeat with a wider band, and at half and at twice the level."
     needs_temperature: ClassVar[bool] = False
 
+    # True for what happened to the recorded reference alone: its link turns that back into the
+    # motion, no correction knows of it, and a model file has it among the `reference_faults`
+    of_reference: ClassVar[bool] = False
+    # another cause that says the same with the other sign; where both do, this one is named
+    mirrors: ClassVar[str | None] = None
     # True for what a record shows by itself (`of_record`, `reading`), and no fit looks for
     read_off: ClassVar[bool] = False
     # True where one clock or one way to the stamps makes it the same for all axes
