@@ -16,7 +16,7 @@ from .parameters import as_mapping, build, number, parameter_fields, plain
 
 SCHEMA = "frac_accel/sensor_model/1"
 AXES = "xyz"
-_OWN_KEYS = ("schema", "core", "effects", "axes")
+_OWN_KEYS = ("schema", "core", "effects", "axes", "reference_faults")
 _LARGEST_FILE = 10_000_000
 
 
@@ -26,7 +26,7 @@ class AxisModel:
 
     Attributes
     ----------
-    core : Oscillator, Arx or FractionalTransferFunction
+    core : Oscillator, Gain, Arx or FractionalTransferFunction
         Linear core as the file gives it.
     effects : tuple of Effect
         In signal order.
@@ -98,7 +98,7 @@ class SensorModel:
 
     Parameters
     ----------
-    core : Oscillator, Arx or FractionalTransferFunction
+    core : Oscillator, Gain, Arx or FractionalTransferFunction
         Core of all three axes.
     effects : iterable of Effect
         Effects on all three axes.
@@ -106,6 +106,9 @@ class SensorModel:
         Models of the axes ``"x"``, ``"y"``, ``"z"`` that differ.
     metadata : dict, optional
         Further keys of the file, such as uncertainties and provenance.
+    reference_faults : iterable of Effect
+        What happened to the recorded reference alone: of the record, not of the sensor, so that
+        neither simulation nor correction knows of it.
 
     Raises
     ------
@@ -113,14 +116,26 @@ class SensorModel:
         Naming the field, its value and what was expected.
     """
 
-    def __init__(self, core, effects=(), axes=None, metadata=None):
+    def __init__(self, core, effects=(), axes=None, metadata=None, reference_faults=()):
         self.metadata = dict(metadata or {})
+        self.reference_faults = _in_signal_order(reference_faults)
+        for fault in self.reference_faults:
+            if not fault.of_reference:
+                raise ModelError(f"reference_faults: {fault.cause} given, which is an effect of "
+                                 "the sensor, expected under effects")
         self._common = AxisModel(core, _in_signal_order(effects))
         self._own = {name: AxisModel(axis.core, _in_signal_order(axis.effects))
                      for name, axis in (axes or {}).items()}
         self.axes = tuple(self._own.get(name, self._common) for name in AXES)
         self._stages = _sample_stages(self.axes)
         for name, axis in zip(AXES, self.axes):
+            for effect in axis.effects:
+                if effect.of_reference:
+                    raise ModelError(f"effects: {effect.cause} given, which is a fault of the "
+                                     "reference, expected under reference_faults")
+                if not effect.acts_on(axis.core):
+                    raise ModelError(f"effects: {effect.cause} given with a core of type "
+                                     f"{axis.core.type}, expected an oscillator")
             axis.effective_core.require_stable(f"axes.{name}.core" if name in self._own else "core")
 
     @property
@@ -253,13 +268,16 @@ class SensorModel:
         if "band_hz" in data:
             _require_band(data["band_hz"])
         metadata = {key: plain(data[key]) for key in data if key not in _OWN_KEYS}
-        return cls(core, effects, axes, metadata)
+        faults = _effects(data.get("reference_faults"), "reference_faults")
+        return cls(core, effects, axes, metadata, faults)
 
     def to_dict(self):
         """Content of the model file; inverse of `from_dict`."""
         data = {"schema": SCHEMA, **_axis_to_dict(self._common)}
         if self._own:
             data["axes"] = {name: _axis_to_dict(axis) for name, axis in self._own.items()}
+        if self.reference_faults:
+            data["reference_faults"] = _as_list(self.reference_faults)
         return plain({**data, **self.metadata})
 
     @classmethod
@@ -430,5 +448,8 @@ def _effects(entries, where):
 
 def _axis_to_dict(axis):
     core = {"type": axis.core.type, **as_mapping(axis.core)}
-    effects = [{"cause": effect.cause, **as_mapping(effect)} for effect in axis.effects]
-    return {"core": core, "effects": effects}
+    return {"core": core, "effects": _as_list(axis.effects)}
+
+
+def _as_list(effects):
+    return [{"cause": effect.cause, **as_mapping(effect)} for effect in effects]

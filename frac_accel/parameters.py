@@ -8,7 +8,7 @@ from .errors import ModelError
 
 
 def parameter(unit, *, above=None, minimum=None, below=None, maximum=None, default=None,
-              null=None, scale=None, reach=None, step=None):
+              null=None, scale=None, reach=None, step=None, whole=False):
     """Declare a number of a core or an effect.
 
     Parameters
@@ -30,9 +30,12 @@ def parameter(unit, *, above=None, minimum=None, below=None, maximum=None, defau
     step : float, optional
         Change for a numerical derivative, relative for a parameter above 0, otherwise in scales.
         Default 1e-3.
+    whole : bool
+        Whether it counts something; no fit varies it (`Effect.alternatives` offers others).
     """
     metadata = {"unit": unit, "above": above, "minimum": minimum, "below": below,
-                "maximum": maximum, "null": null, "scale": scale, "reach": reach, "step": step}
+                "maximum": maximum, "null": null, "scale": scale, "reach": reach, "step": step,
+                "whole": whole}
     if default is None:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
@@ -78,8 +81,24 @@ class Scales:
 
 
 def coefficients():
-    """Declare a list of numbers of a core."""
+    """Declare a list of numbers of a core or an effect."""
     return dataclasses.field(metadata={"list": True})
+
+
+def choice(*words):
+    """Declare a word of an effect, one of those given; no fit varies it."""
+    return dataclasses.field(metadata={"choices": words, "unit": ""})
+
+
+def is_varied(field):
+    """Whether a fit can vary a parameter: a number that counts nothing."""
+    return not any(field.metadata.get(key) for key in ("list", "choices", "whole"))
+
+
+def fixed_values(instance):
+    """Values by name of what no fit varies: counts and words."""
+    return {field.name: getattr(instance, field.name) for field in parameter_fields(type(instance))
+            if not is_varied(field) and not field.metadata.get("list")}
 
 
 def parameter_fields(cls):
@@ -115,8 +134,11 @@ def build(cls, mapping, where):
                 raise ModelError(f"{path}: missing, expected {expectation(field)}")
         elif field.metadata.get("list"):
             values[name] = _numbers(mapping[name], path)
+        elif field.metadata.get("choices"):
+            values[name] = _word(mapping[name], field, path)
         else:
-            values[name] = _in_range(number(mapping[name], path, expectation(field)), field, path)
+            value = _in_range(number(mapping[name], path, expectation(field)), field, path)
+            values[name] = int(value) if field.metadata["whole"] else value
     return cls(**values)
 
 
@@ -131,12 +153,15 @@ def expectation(field):
     """What a parameter may be, in words."""
     if field.metadata.get("list"):
         return "a list of numbers"
+    if field.metadata.get("choices"):
+        return " or ".join(field.metadata["choices"])
     limits = [f"{word} {field.metadata[key]:g}" for key, word in
               (("above", "above"), ("minimum", "at least"), ("below", "below"),
                ("maximum", "at most"))
               if field.metadata[key] is not None]
     unit = field.metadata["unit"]
-    words = "a number" if unit == "1" else f"a number in {unit}"
+    kind = "a whole number" if field.metadata["whole"] else "a number"
+    words = kind if unit == "1" else f"{kind} in {unit}"
     return " ".join([words, " and ".join(limits)]).strip()
 
 
@@ -160,9 +185,19 @@ def _in_range(value, field, where):
     if ((limits["above"] is not None and value <= limits["above"])
             or (limits["minimum"] is not None and value < limits["minimum"])
             or (limits["below"] is not None and value >= limits["below"])
-            or (limits["maximum"] is not None and value > limits["maximum"])):
+            or (limits["maximum"] is not None and value > limits["maximum"])
+            or (limits["whole"] and value != int(value))):
         raise ModelError(f"{where}: {value:g} given, expected {expectation(field)}")
     return value
+
+
+def _word(value, field, where):
+    words = field.metadata["choices"]
+    if value in words:
+        return value
+    close = difflib.get_close_matches(str(value), words, n=1)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
+    raise ModelError(f"{where}: {value!r:.60} given, expected {expectation(field)}{hint}")
 
 
 def _numbers(value, where):

@@ -275,7 +275,9 @@ def _static_gain(transfer):
     gain = transfer(np.array([1e-9 + 0j]))[0]
     size = np.abs(transfer(2j * np.pi * np.geomspace(1e-3, 1e5, 200)))
     largest = np.max(size[np.isfinite(size)], initial=0.0)
-    return float(gain.real) if np.isfinite(gain) and abs(gain) > 1e-6 * largest else 0.0
+    # without bound where a high-pass is undone: what went before is then not in the record
+    bounded = np.isfinite(gain) and abs(gain) < 1e6 * largest
+    return float(gain.real) if bounded and abs(gain) > 1e-6 * largest else 0.0
 
 
 def _product(links, s):

@@ -11,6 +11,7 @@ from .identification.excitation import excited_band
 from .metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
 from .model import AXES
 from .record import Record, Samples
+from .reference import restored
 from .simulation import simulate
 
 # A stamp that has been moved by a skew and back.
@@ -68,7 +69,7 @@ class Validation:
 
 
 def validate(reference, sensor, model, axis="x", temperature_at=None, **wishes):
-    """Judge a model on a measured pair.
+    """Judge a model on a measured pair, the reference without the model's `reference_faults`.
 
     Parameters
     ----------
@@ -90,6 +91,7 @@ def validate(reference, sensor, model, axis="x", temperature_at=None, **wishes):
     FracAccelError
         If the pair cannot be compared.
     """
+    reference = restored(reference, sensor, model, axis, temperature_at)
     pair = Record.of(reference, sensor, axis)
     corrector = Corrector(model, **wishes)
     parts = [*_corrected(corrector, sensor, temperature_at), corrector.finish()]

@@ -88,8 +88,9 @@ def table(found, axis):
     for finding in found.findings:
         lines.append(f"{finding.cause}: {finding.effect.explanation}")
         for name, entry in finding.as_dict()["parameters"].items():
-            lines.append(f"  {name:21} {entry['value']:12.6g} +- {entry['std']:.2g} "
-                         f"{entry['unit']}")
+            value, std = entry["value"], entry["std"]
+            lines.append(f"  {name:21} {value:>12}" if not entry["unit"] else
+                         f"  {name:21} {value:12.6g} +- {std:.2g} {entry['unit']}")
         lines += [f"  {words}" for words in finding.evidence]
     for suspect in found.suspects:
         lines += [f"suspected: {' or '.join(suspect['causes'])}: {suspect['reason']}",

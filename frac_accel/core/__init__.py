@@ -6,8 +6,9 @@ A core is a frozen dataclass with ``type`` (its name in a model file),
 
 from .arx import Arx
 from .fractional_transfer_function import FractionalTransferFunction
+from .gain import Gain
 from .oscillator import Oscillator
 
-CORES = {core.type: core for core in (Oscillator, Arx, FractionalTransferFunction)}
+CORES = {core.type: core for core in (Oscillator, Arx, FractionalTransferFunction, Gain)}
 
-__all__ = ["CORES", "Arx", "FractionalTransferFunction", "Oscillator"]
+__all__ = ["CORES", "Arx", "FractionalTransferFunction", "Gain", "Oscillator"]

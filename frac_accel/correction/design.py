@@ -5,7 +5,7 @@ import functools
 
 import numpy as np
 
-from ..core import Arx, Oscillator
+from ..core import Arx, Gain, Oscillator
 from ..effects import Circumstances
 from ..errors import DesignError, FracAccelError, ModelError
 from ..model import AXES
@@ -359,8 +359,9 @@ def _band(axis, name, rate, bandwidth_hz, lowest_hz, known_band_hz):
 def plateau(axis, band_hz=None):
     """Gain of an axis on its plateau, with its polarity [output units per m/s²].
 
-    An oscillator's plateau is known wherever it was identified. Another core means nothing outside
-    the band in which it was identified: its gain is the median over that band, octave by octave.
+    The plateau of an oscillator or a gain is known wherever it was identified. Another core means
+    nothing outside the band in which it was identified: its gain is the median over that band,
+    octave by octave.
 
     Parameters
     ----------
@@ -373,7 +374,7 @@ def plateau(axis, band_hz=None):
     float
     """
     core = axis.effective_core
-    if isinstance(core, Oscillator):
+    if isinstance(core, (Oscillator, Gain)):
         own = core.sensitivity
     elif band_hz is None:
         # the polarity of the limit, since orders below zero leave s = 0 itself undefined

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import binary_erosion
 
 from ..bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
-from ..core import Oscillator
+from ..core import Gain, Oscillator
 from ..effects import known_effects
 from ..errors import FracAccelError, IdentificationError
 from ..identification.excitation import learning_length, require_excitation
@@ -114,7 +114,8 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     loose = _left_open(model.axis(axis), stds, 1.25 * found.jitter_rms_s / np.sqrt(found.samples))
     engine = functools.partial(
         Engine, record, column, model, base={cause: entry.effect for cause, entry in loose.items()},
-        candidates=[cause for cause, effect in known_effects().items() if not effect.read_off],
+        candidates=[cause for cause, effect in known_effects().items()
+                    if not effect.read_off and effect.acts_on(model.axis(axis).core)],
         log=progress, step=found.step, limit=limit)
     engine, stray = _without_spikes(engine, used, stray, record.reference[:, column])
     if stray.any():
@@ -156,10 +157,10 @@ def _shown(found, measured):
 
 
 def _classical(record, axis, used):
-    """Classical core identified from the record, what it knows of it (nothing, since any cause has
-    bent it), and the effects that it was identified with."""
+    """Classical core (a gain where no resonance shows) identified from the record, what it knows
+    of it (nothing, since any cause has bent it), and the effects that it was identified with."""
     from ..identification import identify
-    model = identify(dataclasses.replace(record, valid=used), axis, "oscillator").model
+    model = identify(dataclasses.replace(record, valid=used), axis, "classical").model
     return (SensorModel(model.core), dict.fromkeys(_CORE, np.inf),
             {effect.cause: effect for effect in model.effects})
 
@@ -168,8 +169,9 @@ def _stated(model, axis):
     """Standard uncertainties that a model states of its core, delay and offset."""
     own = model.axis(axis)
     stated = model.metadata.get("uncertainties")
-    if not isinstance(stated, dict) or not isinstance(own.core, Oscillator) \
-            or own.core.damping_order != 1 or any(effect.restates_core for effect in own.effects):
+    if not isinstance(stated, dict) or not isinstance(own.core, (Oscillator, Gain)) \
+            or getattr(own.core, "damping_order", 1) != 1 \
+            or any(effect.restates_core for effect in own.effects):
         return {}
     return {name: entry["std"] for name, entry in stated.items()
             if isinstance(entry, dict) and isinstance(entry.get("std"), (int, float))

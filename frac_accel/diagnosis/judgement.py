@@ -10,7 +10,7 @@ from scipy.signal import resample_poly
 from ..budget import WORDS
 from ..effects import known_effects
 from ..model import AXES, AxisModel, SensorModel, is_link
-from ..parameters import parameter_fields
+from ..parameters import fixed_values, parameter_fields
 from .experiments import separating_experiment
 from .gain import gain
 from .names import cancelling, undetermined
@@ -78,6 +78,8 @@ class Finding:
             field.name: {"value": float(getattr(self.effect, field.name)),
                          "std": float(self.std[field.name]), "unit": field.metadata["unit"]}
             for field in parameter_fields(type(self.effect)) if field.name in self.std}
+        parameters.update({name: {"value": value, "std": 0.0, "unit": ""}
+                           for name, value in fixed_values(self.effect).items()})
         return {"cause": self.cause, "parameters": parameters, "confidence": self.confidence,
                 "confusable_with": self.confusable_with, "evidence": self.evidence,
                 "explanation": self.effect.explanation, "gain": self.gain.as_dict()}
@@ -208,18 +210,20 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
     -------
     Diagnosis
     """
-    best, gains = _relevant(engine, best)
+    best, gains = _relevant(engine, _mirrored(engine, best))
     left = engine.left(best)
     noise = engine.established_noise(best, noise_std)
     stds = engine.uncertainties(best)
     doubts = _doubts(engine, best, gains, stds, left, noise)
     findings, suspects = [], []
     for cause, g in gains.items():
-        rivals = engine.rivals(best, cause)
+        mirror = best.effects[cause].mirrors
+        rivals = [(margin, causes) for margin, causes in engine.rivals(best, cause)
+                  if not mirror or mirror not in causes]
         margin, other = rivals[0] if rivals else (np.inf, frozenset())
         instead = sorted(other - best.causes)
         entry = Finding(best.effects[cause], stds[cause], _confidence(margin),
-                        instead if margin < 10 * _CLEAR else [],
+                        [*(instead if margin < 10 * _CLEAR else []), *([mirror] if mirror else [])],
                         _evidence(cause, g, margin, instead), g)
         if cause in doubts:
             suspects.append(_suspect({cause}, 0.0, doubts[cause]))
@@ -272,8 +276,10 @@ def _acausal(engine, best, stds):
     """Links that stand beside a delay below zero: it takes back what they say too much."""
     p, base = engine.problem, engine.search.base
     links = [cause for cause, effect in best.effects.items() if cause not in base
-             and (is_link(effect) or effect.pure_delay_s()) and not effect.is_constant]
-    delay = p.axis_model(best.effects).delay_s - p.record.lag_s
+             and (is_link(effect) or effect.pure_delay_s()) and not effect.is_constant
+             and not effect.of_reference]
+    delay = sum(effect.pure_delay_s() for effect in p.axis_model(best.effects).effects
+                if not effect.of_reference) - p.record.lag_s
     std = max((stds.get(cause, {}).get("delay_s", 0.0) for cause in links), default=0.0)
     if len(links) < 2 or delay > -_ACAUSAL * std or delay >= 0:
         return {}
@@ -393,8 +399,11 @@ def _extended(engine, effects):
     own = p.axis_model(effects)
     common = {cause: effect for cause, effect in effects.items() if effect.common_to_axes}
     axes = {name: p.axis_model(common, i) for i, name in enumerate(AXES)}
-    axes[AXES[p.axis]] = AxisModel(own.core, own.effects)
-    return SensorModel(p.baseline.core, p.baseline.effects, axes, p.baseline.metadata)
+    axes[AXES[p.axis]] = own
+    axes = {name: AxisModel(axis.core, tuple(e for e in axis.effects if not e.of_reference))
+            for name, axis in axes.items()}
+    return SensorModel(p.baseline.core, p.baseline.effects, axes, p.baseline.metadata,
+                       [effect for effect in own.effects if effect.of_reference])
 
 
 def _rms(error, rows):

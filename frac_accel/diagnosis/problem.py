@@ -185,7 +185,8 @@ class Problem:
     def axis_model(self, effects, axis=None):
         """Model of an axis (default: the diagnosed one) with these causes."""
         base = self.baseline.axis(self.axis if axis is None else axis)
-        kept = [effect for effect in base.effects if effect.cause not in effects]
+        own = *self.baseline.reference_faults, *base.effects
+        kept = [effect for effect in own if effect.cause not in effects]
         return AxisModel(base.core, tuple(sorted([*kept, *effects.values()],
                                                  key=lambda effect: effect.stage)))
 
@@ -277,16 +278,26 @@ class Problem:
             poles = np.atleast_1d(model.poles())
         except (FracAccelError, ArithmeticError):
             poles = np.array([])
+        if any(pole == 0 for pole in poles):
+            # the constant and the drift that a reference behind a high-pass has lost
+            poles = poles[poles != 0]
+            lost = [np.ones(len(self.time)), self.time / self.time[-1]]
+        else:
+            lost = []
         core, rates = model.effective_core, []
         if getattr(core, "damping_order", 1.0) != 1.0:
             rates = tail_rates(core.natural_frequency_hz, self.time[-1])
-        return self._decays([*(-rate + 0j for rate in rates), *poles])
+        decays = self._decays([*(-rate + 0j for rate in rates), *poles])
+        return np.c_[decays, np.array(lost).T] if lost else decays
 
     def own_motions(self, effect):
         """Orthonormal columns, shape (n, m): slow motions that a cause of its own may have left."""
         slow = [pole for pole in np.atleast_1d(effect.poles())
                 if -pole.real * _EDGE < self.rate]
-        return _span(self._decays(slow) * self.used[:, None])[0]
+        columns = self._decays([pole for pole in slow if pole != 0])
+        if any(pole == 0 for pole in slow):
+            columns = np.c_[columns, np.ones(len(columns)), self.time]
+        return _span(columns * self.used[:, None])[0]
 
     def _decays(self, poles):
         columns = []
@@ -339,6 +350,9 @@ class Problem:
         unknowns = tuple(unknown for cause in effects
                          for unknown in self.unknowns(effects[cause]))
         theta = np.array([_to_theta(getattr(effects[u.cause], u.name), u) for u in unknowns])
+        inside = np.clip(theta, [u.low for u in unknowns], [u.high for u in unknowns])
+        if np.any(inside != theta):
+            theta, effects = inside, self.replaced(effects, unknowns, inside)
         point = self.point(dict(effects), rough)
         return self._improved(Fitted(self, point, unknowns, theta, rough=rough), iterations,
                               hopeless, goal)
@@ -483,6 +497,9 @@ class Problem:
             least, most = self.scales.reach(field, scale)
             low, high = np.log(least), np.log(min(high, most))
         else:
+            if limits["reach"]:
+                least, most = self.scales.reach(field, scale)
+                low, high = max(low, least), min(high, most)
             span = 1e-3 if np.isfinite(low) and np.isfinite(high) else 0
             low, high = low / scale + span, high / scale - span
         return Unknown(effect.cause, field.name, logarithmic, scale, low, high,

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..effects import known_effects
 from ..errors import FracAccelError
+from ..parameters import fixed_values
 from .problem import acts_on_spring
 
 _BEAM = 3
@@ -93,10 +94,29 @@ class Search:
             if trial.rough and trial.cost <= _HOPELESS * best:
                 trial = self.problem.finished(trial, _BEHIND * best, goal)
                 best = min(best, trial.cost)
+            if trial is not self.fits.get(key) and trial.cost <= _BEHIND * best:
+                trial = self._varied(trial)
+                best = min(best, trial.cost)
             goal = min(goal, self._near(trial.cost))
             if trial is not self.fits.get(key):
                 self._keep(trial)
         return sorted((self.fits[key] for key in trials), key=lambda fit: fit.cost)
+
+    def _varied(self, fit):
+        """The best of a fit and its like with another of what no fit varies, such as an order."""
+        tried = set()
+        while True:
+            others = []
+            for cause, effect in fit.effects.items():
+                for other in effect.alternatives():
+                    kind = cause, *fixed_values(other).values()
+                    if kind not in tried:
+                        tried.add(kind)
+                        others.append(self.problem.fit({**fit.effects, cause: other}))
+            better = min(others, key=lambda other: other.cost, default=fit)
+            if better.cost >= fit.cost:
+                return fit
+            fit = better
 
     def _near(self, cost):
         return (1 + _NEAR / self.problem.count) * cost

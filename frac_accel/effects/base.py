@@ -19,11 +19,12 @@ import numpy as np
 
 from ..core import Oscillator
 from ..errors import ModelError
-from ..parameters import parameter_fields
+from ..parameters import is_varied, parameter_fields
 
-# Place in the signal's way through the sensor, from base to record.
-(MOUNTING, CORE, CONDITIONER, DELAY, GAIN, CROSS_AXIS, OFFSET, DEAD_ZONE, INTERFERENCE, CLIPPING,
- QUANTIZATION, STAMPS) = range(12)
+# Place in the signal's way through the sensor, from base to record. What happened to the reference
+# on its way to the record is undone before.
+(REFERENCE, MOUNTING, CORE, CONDITIONER, DELAY, GAIN, CROSS_AXIS, OFFSET, DEAD_ZONE, INTERFERENCE,
+ CLIPPING, QUANTIZATION, STAMPS) = range(-1, 12)
 
 
 class Circumstances(NamedTuple):
@@ -94,6 +95,11 @@ class Effect:
     experiment: ClassVar[str] = "Repeat with a wider band, and at half and at twice the level."
     needs_temperature: ClassVar[bool] = False
 
+    # True for what happened to the recorded reference alone: its link turns that back into the
+    # motion, no correction knows of it, and a model file has it among the `reference_faults`
+    of_reference: ClassVar[bool] = False
+    # another cause that says the same with the other sign; where both do, this one is named
+    mirrors: ClassVar[str | None] = None
     # True for what a record shows by itself (`of_record`, `reading`), and no fit looks for
     read_off: ClassVar[bool] = False
     # True where one clock or one way to the stamps makes it the same for all axes
@@ -137,7 +143,14 @@ class Effect:
         excited : dict of str to bool
             By axis, whether the reference moves along it.
         """
-        return [field.name for field in parameter_fields(cls)]
+        return [field.name for field in parameter_fields(cls) if is_varied(field)]
+
+    def alternatives(self):
+        """Effects of this cause to go on from that differ in what no fit varies, such as an order.
+
+        Nearest ones are enough: each that fits better is asked for its own.
+        """
+        return []
 
     @classmethod
     def left_open(cls, axis_model, stds, stamps_std_s):
@@ -193,6 +206,12 @@ class Effect:
         """
         reading = shown.reading(seen) if shown is not None else None
         return (shown, reading) if reading is not None else None
+
+    @classmethod
+    def acts_on(cls, core):
+        """Whether a sensor with this core can have this cause: motion and spring need a mass."""
+        return isinstance(core, Oscillator) or (
+            cls.change_core is Effect.change_core and cls.add_force is Effect.add_force)
 
     def pure_delay_s(self):
         """Time [s] by which this effect moves the signal as it is."""

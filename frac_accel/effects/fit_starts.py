@@ -7,6 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+# Longest segment of an averaged spectrum, and the largest delay that is tried beside a link
+# [samples].
+_LONGEST_SEGMENT = 1024
+_MOST_DELAY = 8
+
 
 class Start(NamedTuple):
     """Where the fit of a cause may begin.
@@ -78,6 +83,43 @@ def spectral_peaks(view, count=3):
         if len(found) == count:
             break
     return [top * view.rate / len(view.residual) for top in found]
+
+
+def matching(view, links, count=2):
+    """The linear links that come nearest to what is between simulated and measured output.
+
+    Their responses are compared with the averaged ratio of the two, where there is power: as they
+    are, and with any gain and a further delay, which another cause may have to give.
+
+    Parameters
+    ----------
+    view : diagnosis.search.View
+    links : list of Effect
+    count : int
+        How many of either comparison.
+
+    Returns
+    -------
+    list of Effect
+    """
+    from scipy.signal import csd, welch
+    size = min(_LONGEST_SEGMENT, max(64, len(view.measured) // 8))
+    simulated = (view.simulated - view.simulated[view.used].mean()) * view.used
+    measured = (view.measured - view.measured[view.used].mean()) * view.used
+    frequency, power = welch(simulated, view.rate, nperseg=size)
+    ratio = csd(simulated, measured, view.rate, nperseg=size)[1] / np.maximum(power, 1e-300)
+    strong = power > 1e-6 * power.max()
+    strong[0] = False
+    s, ratio, weight = 2j * np.pi * frequency[strong], ratio[strong], power[strong]
+    responses = np.array([link.transfer_function(s) * np.exp(-s * link.pure_delay_s())
+                          for link in links])
+    plain = np.abs(responses - ratio)**2 @ weight
+    delays = np.exp(np.outer(s, np.linspace(-_MOST_DELAY, _MOST_DELAY, 8 * _MOST_DELAY + 1)
+                             / view.rate))
+    shared = np.max(np.abs(np.real((np.conj(responses) * ratio * weight) @ delays)), axis=1)
+    free_of_gain = -shared**2 / (np.abs(responses)**2 @ weight)
+    best = [*np.argsort(plain)[:count], *np.argsort(free_of_gain)[:count]]
+    return [links[i] for i in dict.fromkeys(best)]
 
 
 def strongest_line(view):

@@ -22,6 +22,7 @@ from .record_checks import RecordCheck, check_record, require_magnitude
 from .structures import (
     FractionalStructure,
     FractionalTransferFunctionStructure,
+    GainStructure,
     OscillatorStructure,
 )
 
@@ -32,7 +33,7 @@ _POOR = 0.7
 # Likelihood ratio that two superfluous parameters reach in one of twenty records: chi-squared.
 _LIKELIHOOD_RATIO = 6.0
 STRUCTURES = {"arx": ArxStructure(), "oscillator": OscillatorStructure(),
-              "fractional": FractionalStructure(),
+              "fractional": FractionalStructure(), "gain": GainStructure(),
               "fractional_transfer_function": FractionalTransferFunctionStructure()}
 
 

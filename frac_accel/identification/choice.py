@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import FracAccelError, IdentificationError
 from .candidate import Candidate, fit_of, fitted
+from .excitation import excited_band
 from .fit_validation import judge_residual
 from .frequency_response import linear_share
 from .records import agreement, combine, freed, is_open
@@ -18,6 +19,9 @@ _CLEARLY = 0.7
 # Share of what a linear model could still explain of the classical residual that a fractional
 # damping must take away, and the share of a residual that chance alone seems to explain.
 _TAKEN, _CHANCE = 0.25, 0.1
+# A resonance that far above the excited band, or known no better than this, is out of sight; of a
+# gain, the held-out residual over that with a resonance with which the gain will do.
+_IN_SIGHT, _UNDETERMINED, _NO_BETTER = 1.5, 0.2, 1.05
 # Time constants after which a motion from before the record counts no more, and samples at both
 # ends that the band-limited simulation cannot know.
 _SETTLING = 7.0
@@ -26,6 +30,9 @@ _EDGE = 32
 
 def choose(data):
     """Best of the structures for one record, and why."""
+    flat = flat_instead(data)
+    if flat:
+        return flat
     chosen, best, reason = _choose_oscillator(data)
     if linear_share(data.reference, chosen.fit.residual) < 1 - _CLEARLY**2:
         return chosen, reason
@@ -39,6 +46,41 @@ def choose(data):
                         f"{held_out}")
     return arx, ("it predicts clearly better than an oscillator with classical or fractional "
                  f"damping: {held_out}; something else acts, which its coefficients cannot name")
+
+
+def choose_classical(data):
+    """A gain where the record shows no resonance, otherwise an oscillator, and why."""
+    return flat_instead(data) or (Candidate.of("oscillator", data), "a resonance shows")
+
+
+def flat_instead(data):
+    """A gain and why, or None where the record shows the resonance of an oscillator.
+
+    Whatever else makes fast motion smaller, such as a smoothed reference, bends a resonance out
+    there to its liking; it is believed only where it predicts clearly better.
+    """
+    try:
+        flat = Candidate.of("gain", data)
+        classical = Candidate.of("oscillator", data)
+    except IdentificationError:
+        return None
+    resonance = classical.fit["natural_frequency_hz"]
+    std = classical.fit.std[classical.fit.names.index("natural_frequency_hz")]
+    highest = excited_band(data.reference, data.sensor, data.pair.sampling_rate_hz)[1]
+    if resonance < _IN_SIGHT * highest and std < _UNDETERMINED * resonance:
+        return None
+    delay, delay_std = (values[classical.fit.names.index("delay_s")]
+                        for values in (classical.fit.values, classical.fit.std))
+    if flat.held_out_nrmse <= _NO_BETTER * classical.held_out_nrmse:
+        why = "does not predict clearly better than a gain"
+    elif delay < -_SIGNIFICANT * delay_std:
+        why = (f"would answer {-delay:.3g} s before the reference moves, as if that were smoothed; "
+               "its parameters are open, and a gain is all that can be said")
+    else:
+        return None
+    return flat, (f"no resonance shows up to {highest:.4g} Hz: an oscillator at {resonance:.4g} "
+                  f"+- {std:.2g} Hz {why} (held-out residual "
+                  f"{classical.held_out_nrmse:.3%} against {flat.held_out_nrmse:.3%})")
 
 
 def choose_of_several(structure, datas, records):

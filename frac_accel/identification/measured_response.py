@@ -74,4 +74,5 @@ class MeasuredResponse:
         return compared, [] if compared["agrees"] else [compared["words"]]
 
     def _suits(self, structure):
-        return self.points is not None and not isinstance(structure, ArxStructure)
+        return self.points is not None and bool(structure.names) \
+            and not isinstance(structure, ArxStructure)

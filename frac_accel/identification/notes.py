@@ -57,6 +57,8 @@ def _seismic_notes(parameters, chosen, highest):
         elif name != "sensitivity" and any(note.startswith("natural_f") for note in notes):
             notes.append(f"{name} is not determined by these data (nor is the resonance that it "
                          "describes)")
+    if "natural_frequency_hz" not in parameters:
+        return notes
     resonance = parameters["natural_frequency_hz"]["value"]
     if highest < resonance / 3:
         notes.append(f"the excitation ends at {highest:.4g} Hz, far below the resonance at "

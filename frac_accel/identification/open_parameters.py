@@ -37,7 +37,7 @@ def open_combinations(fit, band_hz, sampling_rate_hz):
                 if factor > 1 / (1 - _TOGETHER**2)]
     loose = [name for name in together if name != "delay_s"
              and fit.std[fit.names.index(name)] > _LOOSE * abs(fit[name])]
-    if len(together) < 2 or not loose:
+    if len(together) < 2 or not loose or "natural_frequency_hz" not in names:
         return []
     words = ", ".join(together[:-1]) + " and " + together[-1]
     wanted = _what_to_excite(fit, band_hz, sampling_rate_hz)

@@ -157,8 +157,8 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
         rough = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
                          None if valid is None else valid[part], lag_s)
         state = rough.solve(rough.starts() if hint is None else [hint, *rough.starts()])
-        if (state.free_share > _RINGING or rough.explained(state) < _POOR
-                or state.theta[-1] < -_EARLY):
+        if structure.names and (state.free_share > _RINGING or rough.explained(state) < _POOR
+                                or state.theta[-1] < -_EARLY):
             # what still rings from before the record may have led astray
             other = rough.solve(rough.ringing_starts())
             state = min(state, other, key=lambda state: state.cost)
@@ -248,12 +248,12 @@ class _Problem:
         turned = (weight * response)[:, None] * np.exp(np.outer(s, delays) / self.rate)
         shared = np.real(np.conj(models) @ turned)
         explained = shared**2 / (np.abs(models)**2 @ weight)[:, None]
-        held = np.array([name in self.structure.held for name in self.structure.names])
+        held = np.array([name in self.structure.held for name in self.structure.names], bool)
         best_delay = np.argmax(explained, axis=1)
         explained = np.max(explained, axis=1)
         chosen, seen = [], {}
         # neighbours in frequency end in the same place; other dampings may not
-        kinds = np.c_[np.round(grid[:, 0], 1), np.round(grid[:, 1:], 3)].tolist()
+        kinds = np.c_[np.round(grid[:, :1], 1), np.round(grid[:, 1:], 3)].tolist()
         groups = grid[:, held].tolist()
         most = self.structure.starting_points * len(set(map(tuple, groups)))
         for point in np.argsort(explained)[::-1]:
@@ -512,7 +512,7 @@ class _AveragedResponse:
         self.structure, self.prepared, self.weight = structure, prepared, weight
         self.shift = -s / problem.rate
         self.wanted = _real(weight * response)
-        self.free = np.r_[[name not in structure.held for name in structure.names], True]
+        self.free = np.array([name not in structure.held for name in structure.names] + [True])
         self.low, self.high = problem.low[:-1], problem.high[:-1]
 
     def improve(self, theta):

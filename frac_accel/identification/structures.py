@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..core import Oscillator
+from ..core import Gain, Oscillator
 from ..core.oscillator import tail_rates
 from ..core.principal_sheet import fractional_root
 from ..core.sensor_form import from_sensor_parameters
@@ -91,6 +91,36 @@ class OscillatorStructure:
         """Core of a sensor model, from anything that maps `names` and ``sensitivity`` to values."""
         return Oscillator(natural_frequency_hz=fit["natural_frequency_hz"],
                           damping_ratio=fit["damping_ratio"], sensitivity=fit["sensitivity"])
+
+
+class GainStructure(OscillatorStructure):
+    """A sensor far below its resonance: sensitivity, delay and offset alone."""
+
+    names = ()
+
+    def response(self, s, theta):
+        return np.ones(np.broadcast_shapes(np.shape(theta)[1:], s.shape), complex)
+
+    def gradient(self, s, theta):
+        return self.response(s, theta), []
+
+    def physical(self, theta):
+        return np.empty(0), np.empty((0, 0))
+
+    def bounds(self, rate, n):
+        return [], []
+
+    def grid(self, low_hz, high_hz, peak_hz):
+        return np.empty((1, 0))
+
+    def mode(self, theta):
+        return None, None
+
+    def decay_rates(self, theta, duration_s):
+        return np.array([])
+
+    def core(self, fit):
+        return Gain(sensitivity=fit["sensitivity"])
 
 
 class FractionalStructure(OscillatorStructure):

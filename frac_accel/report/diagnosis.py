@@ -163,8 +163,9 @@ def _parameters(part, entity, old, stds):
             continue
         value = getattr(entity, field.name)
         shown, std = rounded(value, stds.get((part, field.name), 0.0))
-        rows.append([part, field.name, "–" if old is None else f"{getattr(old, field.name):.6g}",
-                     shown, std or "–", field.metadata["unit"].replace("^2", "²")])
+        before = "–" if old is None else rounded(getattr(old, field.name), 0.0)[0]
+        rows.append([part, field.name, before, shown,
+                     std or "–", field.metadata["unit"].replace("^2", "²")])
     return rows
 
 

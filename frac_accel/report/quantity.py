@@ -10,7 +10,9 @@ def rounded(value, std):
 
     Parameters
     ----------
-    value, std : float
+    value : float or str
+        A word stands as it is.
+    std : float
 
     Returns
     -------
@@ -24,6 +26,8 @@ def rounded(value, std):
     >>> rounded(1234567.0, 4321.0)
     ('1234600', '4300')
     """
+    if isinstance(value, str):
+        return value, ""
     if not (math.isfinite(std) and std > 0 and math.isfinite(value)):
         return f"{value:.6g}", ""
     digits = 1 - math.floor(math.log10(std))

@@ -10,7 +10,7 @@ from ..effects import IDENTIFIED, effect_of
 from ..effects.base import GAIN
 from ..errors import ModelError
 from ..model import AXES, AxisModel
-from ..parameters import number, parameter_fields
+from ..parameters import is_varied, number, parameter_fields
 
 # Rounding that a covariance may have suffered, of its correlations.
 _ROUNDING = 1e-6
@@ -310,13 +310,13 @@ def _find(axis, name, where):
             raise ModelError(f"{where}: {name}: the uncertainty of {owner} cannot be propagated, "
                              "only that of linear links and of the offset")
     for field in parameter_fields(type(part)):
-        if field.name == key and not field.metadata.get("list"):
+        if field.name == key and is_varied(field):
             limits = field.metadata
             low = limits["above"] if limits["above"] is not None else limits["minimum"]
             high = limits["below"] if limits["below"] is not None else limits["maximum"]
             return (getattr(part, key), -np.inf if low is None else low,
                     np.inf if high is None else high)
-    known = [field.name for field in parameter_fields(type(part)) if not field.metadata.get("list")]
+    known = [field.name for field in parameter_fields(type(part)) if is_varied(field)]
     raise ModelError(f"{where}: {name}: no such parameter, expected one of "
                      f"{', '.join([*known, 'delay_s', 'offset'])}")
 
