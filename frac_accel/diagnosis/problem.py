@@ -43,6 +43,7 @@ class Unknown:
     low: float
     high: float
     step: float
+    jumps: bool = False
 
 
 class Point(NamedTuple):
@@ -408,6 +409,7 @@ class Problem:
         if forced and (crossed or not fit.rough):
             before = self.simulate(point.effects, False, steps)
         for i, unknown in enumerate(fit.unknowns):
+            sides = []
             for step in (unknown.step, -unknown.step):
                 moved = theta.copy()
                 moved[i] = np.clip(theta[i] + step, unknown.low, unknown.high)
@@ -427,9 +429,35 @@ class Problem:
                 free = self.free_columns(new)
                 if free is not point.columns and free.shape == point.columns.shape:
                     change = change + (free - point.columns) @ point.left
-                columns[:, i] = change / (moved[i] - theta[i])
-                break
+                sides.append((moved[i] - theta[i], change))
+                if not unknown.jumps:
+                    break
+            if len(sides) == 2:
+                (up, more), (down, less) = sides
+                columns[:, i] = (more - less) / (up - down)
+            elif sides:
+                columns[:, i] = sides[0][1] / sides[0][0]
         return self.clear(columns, point.free)
+
+    def jump_std(self, fit, unknown, peak):
+        """Standard uncertainty of an instant at which something jumps, by the cost around it.
+
+        A quarter of the range in which the cost stays within four variances of the noise, times
+        the `peak` of its density; at least that of an instant between two samples.
+        """
+        limit = fit.cost * (1 + 4 * peak / self.count)
+        here, width = getattr(fit.effects[unknown.cause], unknown.name), 0.0
+        for side in (-1, 1):
+            away = 0.5 / self.rate
+            while away < self.time[-1]:
+                moved = dataclasses.replace(fit.effects[unknown.cause],
+                                            **{unknown.name: max(here + side * away, 0.0)})
+                point = self._point({**fit.effects, unknown.cause: moved}, False)
+                if point.cost > limit:
+                    break
+                away *= 1.5
+            width += away
+        return max(width / 4, 1 / (np.sqrt(12) * self.rate))
 
     def replaced(self, effects, unknowns, theta):
         """Effects with the values of the unknowns."""
@@ -461,7 +489,7 @@ class Problem:
             span = 1e-3 if np.isfinite(low) and np.isfinite(high) else 0
             low, high = low / scale + span, high / scale - span
         return Unknown(effect.cause, field.name, logarithmic, scale, low, high,
-                       limits["step"] or _STEP)
+                       limits["step"] or _STEP, limits["jumps"])
 
     @functools.cached_property
     def scales(self):
