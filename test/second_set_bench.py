@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from frac_accel.model import SensorModel
 from frac_accel.bag import Samples
+from frac_accel.model import SensorModel
 
 RATE = 500.0
 CORE = {"type": "oscillator", "natural_frequency_hz": 80.0, "damping_ratio": 0.3,
