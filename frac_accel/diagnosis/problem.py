@@ -210,7 +210,7 @@ class Problem:
         linear = {name: other for name, other in effects.items()
                   if not acts_on_spring(other) and name != cause}
         model = self.axis_model(linear)
-        if acts_on_spring(effect):
+        if acts_on_spring(effect) and type(effect).base_gain is Effect.base_gain:
             motion = self._motion({name: other for name, other in effects.items() if name != cause})
             added = self.force(model, effect, motion)
             if cause in effects:
@@ -397,6 +397,13 @@ class Problem:
         return Point(effects, simulated, columns, free, back @ components, residual,
                      float(residual @ residual))
 
+    def cost(self, effects):
+        """Cost of these causes with the parameters that they have; infinite without a bound."""
+        try:
+            return self._point(effects, False).cost
+        except FracAccelError:
+            return np.inf
+
     def slopes(self, fit):
         """Derivatives of the output by the unknowns of a fit, shape (n, p)."""
         point, theta = fit.point, fit.theta
@@ -495,6 +502,28 @@ class Problem:
     def scales(self):
         """What is small or large in this record."""
         return Scales(float(np.std(self.measured[self.used])), self.rate, float(self.time[-1]))
+
+    @functools.cached_property
+    def mixing(self):
+        """How much of each axis is in each other one, by least squares on the model in use.
+
+        Matrix, shape (3, 3): row i has the shares of the axes' simulated outputs in the measured
+        axis i, NaN where either does not move; and the standard uncertainties as for white noise.
+        """
+        moving = [axis for axis in range(3) if np.ptp(self.record.reference[:, axis])]
+        shares, stds = np.full((2, 3, 3), np.nan)
+        columns = [self.simulator(axis).respond(self.baseline.axis(axis))[self.used]
+                   for axis in moving]
+        basis = np.stack([*columns, np.ones(self.count)], axis=1)
+        inverse = np.linalg.pinv(basis.T @ basis)
+        for axis in range(3):
+            measured = self.record.sensor[self.used, axis]
+            if np.ptp(measured):
+                found = inverse @ (basis.T @ measured)
+                noise = np.var(measured - basis @ found)
+                shares[axis, moving] = found[:-1]
+                stds[axis, moving] = np.sqrt(noise * np.diag(inverse)[:-1])
+        return shares, stds
 
     @functools.cached_property
     def excited(self):
