@@ -4,6 +4,7 @@ import numpy as np
 
 from .correction.design import design_simulator
 from .correction.stream import Stream
+from .time_steps import moved
 
 
 class LiveSimulator(Stream):
@@ -23,8 +24,8 @@ class LiveSimulator(Stream):
     Notes
     -----
     See `Stream` for how samples flow. Each keeps the stamp of the reference sample that it belongs
-    to, so the sensor's own delay is in the values, as in `simulate`; only a skewed clock changes
-    stamps. A nonlinear spring and friction are simulated offline alone.
+    to, so the sensor's own delay is in the values, as in `simulate`; only a clock that is skewed or
+    jumps changes stamps. A nonlinear spring and friction are simulated offline alone.
     """
 
     def _design(self, model, sample_rate_hz, **wishes):
@@ -34,13 +35,15 @@ class LiveSimulator(Stream):
         super()._begin()
         self._effects = self._model.live_simulation(self.sample_rate_hz)
 
-    def _after(self, values, index, stamps_ns):
-        return self._effects(values, self._circumstances(index, stamps_ns))
+    def _after(self, values, variance, index, stamps_ns):
+        return self._effects(values, self._circumstances(index, stamps_ns)), variance
 
     def _stamps(self, stamps_ns):
         """A clock that runs slow puts the same instant at an earlier stamp."""
         ratio = self._model.axes[0].clock_ratio
-        if ratio == 1:
+        steps = self._model.axes[0].time_steps
+        if ratio == 1 and not steps:
             return stamps_ns
         since = stamps_ns - self._record_start_ns
+        stamps_ns = self._record_start_ns + moved(since, steps)
         return stamps_ns + np.round((1 / ratio - 1) * since).astype(np.int64)

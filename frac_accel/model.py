@@ -3,6 +3,7 @@
 import dataclasses
 import difflib
 import functools
+import math
 
 import numpy as np
 import yaml
@@ -46,10 +47,19 @@ class AxisModel:
     @property
     def static_force(self):
         """StaticForce of the core's spring beyond its linear part; false where there is none."""
-        force = StaticForce()
+        force = StaticForce(core=self.effective_core)
         for effect in self.effects:
             force = effect.add_force(force)
         return force
+
+    def base_gain(self, time_s):
+        """Gain of the base's acceleration before the core at times since the record's start."""
+        return math.prod(effect.base_gain(time_s) for effect in self.effects)
+
+    @property
+    def changes_base(self):
+        """Whether `base_gain` can be other than 1."""
+        return any(type(effect).base_gain is not Effect.base_gain for effect in self.effects)
 
     @property
     def delay_s(self):
@@ -60,6 +70,11 @@ class AxisModel:
     def clock_ratio(self):
         """Time that passes while the stamps advance by one second."""
         return float(np.prod([effect.clock_ratio() for effect in self.effects]))
+
+    @property
+    def time_steps(self):
+        """Pairs of instant and jump of the stamps [s], in the order of time."""
+        return tuple(sorted(step for effect in self.effects for step in effect.time_steps()))
 
     @property
     def limits(self):

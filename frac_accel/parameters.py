@@ -8,7 +8,7 @@ from .errors import ModelError
 
 
 def parameter(unit, *, above=None, minimum=None, below=None, maximum=None, default=None,
-              null=None, scale=None, reach=None, step=None, whole=False):
+              null=None, scale=None, reach=None, step=None, whole=False, jumps=False):
     """Declare a number of a core or an effect.
 
     Parameters
@@ -32,10 +32,13 @@ def parameter(unit, *, above=None, minimum=None, below=None, maximum=None, defau
         Default 1e-3.
     whole : bool
         Whether it counts something; no fit varies it (`Effect.alternatives` offers others).
+    jumps : bool
+        True where the output does not change smoothly, such as for the instant of a step: its
+        derivative is then the mean slope from `step` below to `step` above.
     """
     metadata = {"unit": unit, "above": above, "minimum": minimum, "below": below,
                 "maximum": maximum, "null": null, "scale": scale, "reach": reach, "step": step,
-                "whole": whole}
+                "whole": whole, "jumps": jumps}
     if default is None:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
@@ -63,6 +66,7 @@ class Scales:
     per_level_squared = property(lambda self: 1 / self.level**2)
     interval = property(lambda self: 1 / self.rate)
     per_duration = property(lambda self: 1 / self.duration)
+    level_per_duration = property(lambda self: self.level / self.duration)
 
     def of(self, field, value):
         """Change of the parameter of a dataclass field that counts as one, near a value."""

@@ -155,13 +155,34 @@ class AxisSimulator:
 
     def respond(self, axis_model):
         """Output of the core and its links, delay and clock: before the effects on the samples."""
+        if axis_model.changes_base:
+            gain = axis_model.base_gain(self.circumstances.time_s + self._lag_s)
+            return self._with_base(gain * (self._moving + self._level))._respond(axis_model)
+        return self._respond(axis_model)
+
+    def _with_base(self, reference):
+        """The same simulator for another acceleration of the base."""
+        return AxisSimulator(reference, self._rate, self.circumstances.temperature_c,
+                             self._start_time_s, "steady" if self._level else "rest",
+                             self._least_steps, self._lag_s)
+
+    def _respond(self, axis_model):
+        result, late_s = self._late(axis_model, 0.0), 0.0
+        for at_s, step_s in axis_model.time_steps:
+            late_s += step_s
+            result = np.where(self.circumstances.time_s >= at_s, self._late(axis_model, late_s),
+                              result)
+        return result
+
+    def _late(self, axis_model, late_s):
+        """Response with a further delay."""
         core = axis_model.effective_core
         if isinstance(core, Arx) and self._rate > core.sampling_rate_hz * (1 + 1e-6):
             raise ModelError(f"core.sampling_rate_hz: the model holds at {core.sampling_rate_hz:g} "
                              f"Hz, the record has {self._rate:g} Hz")
         ratio = axis_model.clock_ratio
         # what the clock is off already at the start is a delay like any other
-        delay_s = axis_model.delay_s - self._lag_s - (ratio - 1) * self._start_time_s
+        delay_s = axis_model.delay_s + late_s - self._lag_s - (ratio - 1) * self._start_time_s
         result = self._linear(axis_model, delay_s, ratio)
         force = axis_model.static_force
         if force and not (self._still and not self._level):
@@ -192,7 +213,8 @@ class AxisSimulator:
                                  f"simulated: pip install numba ({error})") from None
         core = model.effective_core
         natural = 2 * np.pi * core.natural_frequency_hz
-        wanted = self._least_steps * max(1.0, 3 * core.natural_frequency_hz / self._rate)
+        highest = core.natural_frequency_hz * np.sqrt(1 + force.slope)
+        wanted = self._least_steps * max(1.0, 3 * highest / self._rate)
         steps = int(np.ceil(min(wanted, _MOST_STEPS_PER_SAMPLE)))
         position = ratio * np.arange(self._n) - delay_s * self._rate
         count = int(max(position[-1], self._n)) + _BEYOND
@@ -204,7 +226,8 @@ class AxisSimulator:
         motion, modes = kept(self._motions, known_by, self._core_motion, *known_by, most=1)
         start = force.equilibrium(load) - load
         deviation = kept(self._deviations, (known_by, force), nonlinear_motion.deviation, modes,
-                         force, natural / (self._rate * steps), motion, start)
+                         force, natural / (self._rate * steps), motion, start,
+                         natural * self._start_time_s)
         if not np.isfinite(deviation[-1]):
             raise FracAccelError("the model's motion grows without bound: its nonlinear terms are "
                                  "too large for this record")

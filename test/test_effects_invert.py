@@ -18,13 +18,21 @@ ON_SAMPLES = ("offset", "cross_axis_sensitivity")
 NONLINEAR = ("cubic_stiffness", "quadratic_stiffness", "coulomb_friction", "hysteresis")
 CORE = ("core_parameter_shift",)
 IN_TIME = ("clock_skew", "gain_drift", "temperature_sensitivity", "tone_interference")
+# in test_changes_in_time
+CHANGING = ("offset_drift", "thermal_offset", "offset_step", "gain_step", "time_step")
 LOSSY = ("clipping", "dead_zone", "quantization", "dropped_samples", "timestamp_jitter")
+
+# in test_further_forces
+FORCES = ("stiffness_drift", "quadratic_damping", "impact_stop")
+# in test_misalignment
+TURNED = ("misalignment",)
 
 
 def test_every_effect_of_this_package_is_tested_here():
     ours = {cause for cause, effect in known_effects().items()
             if effect.__module__.startswith("frac_accel.")}
-    assert ours == {*LINEAR, *ON_SAMPLES, *NONLINEAR, *CORE, *IN_TIME, *LOSSY}
+    assert ours == {*LINEAR, *ON_SAMPLES, *NONLINEAR, *CORE, *IN_TIME, *LOSSY,
+                    *CHANGING, *FORCES, *TURNED}
 
 
 @pytest.mark.parametrize("cause", rig.CAUSES)

@@ -227,7 +227,7 @@ def test_only_an_oscillator_has_a_spring(cause):
     ({"cause": "timestamp_jitter", "rms_s": -1.0}, "rms_s"),
     ({"cause": "coulomb_friction", "level": -1.0}, "level"),
     ({"cause": "dead_zone", "half_width": -1.0}, "half_width"),
-    ({"cause": "hysteresis", "strength": 0.1, "beta": 0.1, "gamma": -0.2}, "gamma"),
+    ({"cause": "hysteresis", "strength": 0.1, "beta": -0.1, "gamma": 0.2}, "beta"),
     ({"cause": "tone_interference", "frequency_hz": 0.0, "amplitude": 1.0}, "frequency_hz"),
 ])
 def test_parameters_that_cannot_be_are_refused(effect, words):

@@ -41,7 +41,7 @@ _inlined = numba.njit(cache=True, error_model="numpy", inline="always", fastmath
 _follow_one_way = _inlined(follow_one_way)
 
 
-def deviation(modes, force, step, motion, start):
+def deviation(modes, force, step, motion, start, elapsed=0.0):
     r"""Deviation d of the output on the grid.
 
     Parameters
@@ -55,6 +55,8 @@ def deviation(modes, force, step, motion, start):
         `derivatives_needed` more than one.
     start : float
         Deviation at the start, where the sensor is at rest.
+    elapsed : float
+        Time since the record's start at the grid's first point, in :math:`\tau`.
 
     Returns
     -------
@@ -68,7 +70,7 @@ def deviation(modes, force, step, motion, start):
         (modes.poles, modes.residues, modes.of_displacement, modes.of_velocity))
     terms = np.array(force.polynomial[::-1], float)
     parameters = np.array([force.friction_level, force.strength, force.beta, force.gamma])
-    laws = _compiled_laws(force.laws)
+    laws = _compiled_laws(force.laws, elapsed)
     middles = _middles(motion)
     if force.friction_level == 0:
         return _integrate(poles, residues, displacement, pairs, terms, parameters, *laws, step,
@@ -92,15 +94,16 @@ def _compiled_law(function):
     return numba.cfunc(_LAW, cache=True, error_model="numpy")(function)
 
 
-def _compiled_laws(laws):
-    """Functions (at least one), their number, and the parameters of each in a row."""
+def _compiled_laws(laws, elapsed):
+    """Functions (at least one), their number, the parameters of each in a row, their states."""
     functions = tuple(_compiled_law(law.function) for law in laws)
     rows = [np.array(law.parameters, float) for law in laws]
     width = max((len(row) for row in rows), default=1)
     parameters = np.zeros((max(len(rows), 1), max(width, 1)))
     for i, row in enumerate(rows):
         parameters[i, :len(row)] = row
-    return functions or (_compiled_law(no_force),), len(functions), parameters
+    begin = np.array([elapsed if law.timed else 0.0 for law in laws] or [0.0])
+    return functions or (_compiled_law(no_force),), len(functions), parameters, begin
 
 
 def _middles(motion):
@@ -420,7 +423,7 @@ def _start(poles, now, real, imaginary, start, of_displacement):
 
 @_fast
 def _integrate(poles, residues, of_displacement, pairs, terms, parameters, functions, count,
-               constants, step, motion, middles, start):
+               constants, begin, step, motion, middles, start):
     m = len(poles)
     rows, gains, sums, now = (np.empty((12, m)), np.empty((6, m)), np.empty((2, 3, 3)),
                               np.empty((6, m)))
@@ -433,6 +436,7 @@ def _integrate(poles, residues, of_displacement, pairs, terms, parameters, funct
     result[0] = start
     q0, v0, z = motion[0, 0] + start, motion[1, 0] if orders > 1 else 0.0, 0.0
     states = np.zeros((3, len(functions)))
+    states[0] = begin
     n0 = _power_terms(terms, q0) + _follow_laws(functions, count, constants, states[0], states[0],
                                                 q0, v0, q0, v0, 0.0)
     nm, ne = n0, n0
@@ -456,7 +460,8 @@ def _integrate(poles, residues, of_displacement, pairs, terms, parameters, funct
 
 @_fast
 def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pairs, mass, terms,
-                             parameters, functions, count, constants, step, motion, middles, start):
+                             parameters, functions, count, constants, begin, step, motion, middles,
+                             start):
     m = len(poles)
     rows, gains, sums, now = (np.empty((12, m)), np.empty((6, m)), np.empty((2, 3, 3)),
                               np.empty((6, m)))
@@ -472,6 +477,7 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
     q0, v0, z = motion[0, 0] + start, motion[1, 0], 0.0
     slip, sticks = np.sign(v0), v0 == 0
     states = np.zeros((3, len(functions)))
+    states[0] = begin
     n0 = level * slip + _power_terms(terms, q0) + _follow_laws(
         functions, count, constants, states[0], states[0], q0, v0, q0, v0, 0.0)
     if sticks:
@@ -517,6 +523,10 @@ def _integrate_with_friction(poles, residues, of_displacement, of_velocity, pair
                     nm, ne = _parabola(n0, nm, ne, share / 2), _parabola(n0, nm, ne, share)
                     r, g, s = part_rows, part_gains, part_sums
                     _prepare(step * left, poles, residues, pairs, r, g, s)
+                if count:
+                    _follow_laws(functions, count, constants, states[0], states[1], q0, 0.0, q0,
+                                 0.0, step * left)
+                    states[0] = states[1]
                 qe, ve, _ = _between(motion, index, position + left)
                 _advance(r, g, real, imaginary, pairs, n0, nm, ne)
                 _add(real, imaginary, q0 - qe - _seen(now, 0, real, imaginary, pairs),

@@ -22,10 +22,16 @@ class ForceLaw(NamedTuple):
         at the start; with a duration of 0 the function says the force at q1, v1.
     parameters : tuple of float
         Handed over as an array.
+    timed : bool
+        Whether the state is the time tau since the record's start.
+    slope : float
+        Largest slope of the force by q: steps must be the finer.
     """
 
     function: Callable
     parameters: tuple
+    timed: bool = False
+    slope: float = 0.0
 
     def along(self, motion, velocity, duration, state=0.0, before=None):
         """Force along a motion, shape (n,), and the state after it.
@@ -77,6 +83,8 @@ class StaticForce:
         R. Bouc (1967) and Y.-K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249-263.
     laws : tuple of ForceLaw
         Further terms of :math:`N`.
+    core : Oscillator, optional
+        What the spring belongs to, for laws that need to know.
     """
 
     polynomial: tuple = ()
@@ -85,6 +93,12 @@ class StaticForce:
     beta: float = 0.0
     gamma: float = 0.0
     laws: tuple = ()
+    core: object = None
+
+    @property
+    def slope(self):
+        """Largest slope by q that a law declares."""
+        return max((law.slope for law in self.laws), default=0.0)
 
     def __bool__(self):
         return bool(any(self.polynomial) or self.friction_level != 0 or self.strength != 0
@@ -97,9 +111,10 @@ class StaticForce:
         terms[power - 2] += coefficient
         return dataclasses.replace(self, polynomial=tuple(terms.tolist()))
 
-    def with_law(self, function, *parameters):
+    def with_law(self, function, *parameters, timed=False, slope=0.0):
         """The same with a further term; see `ForceLaw`."""
-        return dataclasses.replace(self, laws=(*self.laws, ForceLaw(function, parameters)))
+        law = ForceLaw(function, parameters, timed, slope)
+        return dataclasses.replace(self, laws=(*self.laws, law))
 
     def equilibrium(self, load):
         """Output under a load that has been there for ever: q + sum(alpha_k q**k) = `load`.

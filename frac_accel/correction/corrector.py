@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..time_steps import moved
 from .design import design_inverse
 from .stream import Stream
 
@@ -39,6 +40,7 @@ class Corrector(Stream):
         self._clips = bool(np.isfinite(model.limits).any())
         self._has_effects = any(axis.effects for axis in model.axes)
         self._needs_temperature = model.needs_temperature
+        self._changes_base = any(axis.changes_base for axis in model.axes)
 
     def _count(self, values):
         found = {}
@@ -53,6 +55,7 @@ class Corrector(Stream):
         super()._begin()
         self._inverse = self._model.live_inverse(self.sample_rate_hz)
         self._skew = self._model.axes[0].clock_ratio - 1
+        self._steps = [(at_s, -step_s) for at_s, step_s in self._model.axes[0].time_steps]
 
     def _before(self, values, variance, index, stamps_ns):
         if self._clips:
@@ -64,10 +67,20 @@ class Corrector(Stream):
                                              self._circumstances(index, stamps_ns))
         return values, variance
 
+    def _after(self, values, variance, index, stamps_ns):
+        if not self._changes_base:
+            return values, variance
+        time_s = 1e-9 * (self._stamps(stamps_ns) - self._record_start_ns)
+        gain = np.stack([np.broadcast_to(axis.base_gain(time_s), len(time_s))
+                         for axis in self._model.axes], axis=1)
+        return values / gain, variance / gain**2
+
     def _stamps(self, stamps_ns):
         """Instants that the samples with these stamps show."""
+        since_start = stamps_ns - self._record_start_ns
+        if self._steps:
+            stamps_ns = self._record_start_ns + moved(since_start, self._steps)
         if self._skew:
-            since_start = stamps_ns - self._record_start_ns
             stamps_ns = stamps_ns + np.round(self._skew * since_start).astype(np.int64)
         return stamps_ns - self.design.sensor_delay_ns
 

@@ -255,6 +255,9 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
 def _clock_ratio(model):
     """Ratio of the sensor's clock, which is one for all axes."""
     ratios = {axis.clock_ratio for axis in model.axes}
+    if len({axis.time_steps for axis in model.axes}) > 1:
+        raise DesignError("effects: time_step differs between the axes, but a sample has one stamp "
+                          "for all of them")
     if len(ratios) > 1:
         raise DesignError("effects: clock_skew differs between the axes, but a sample has one "
                           "stamp for all of them")

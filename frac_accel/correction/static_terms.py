@@ -32,6 +32,8 @@ _BAND_TOLERANCE = 5e-3
 # Parts of N that come with a coefficient each, and the powers of q, which do, too.
 FRICTION, HYSTERESIS = PARTS = "friction", "hysteresis"
 POWERS = (2, 3)
+# Bouc-Wen variable [output units] beyond which a spike has taken an unbounded branch along.
+_LARGEST_Z = 1e12
 _DELAYS = (6, 8, 12, 16, 24, 32, 48, 64)
 
 
@@ -194,9 +196,11 @@ class StaticTermsState:
         The samples of each axis before the first: a constant.
     parts : tuple
         Of `PARTS`, or powers of q: those that are wanted one by one, too.
+    elapsed_s : float
+        Time [s] of the first sample since the record's start.
     """
 
-    def __init__(self, terms, level, parts=()):
+    def __init__(self, terms, level, parts=(), elapsed_s=0.0):
         self._terms = terms
         self._states = [FilterState(phase, level) for phase in terms.phases]
         gain = terms.phases[0].static_gain
@@ -209,7 +213,9 @@ class StaticTermsState:
                                          else np.zeros(len(level))) for part in parts}
         self._z, self._before = np.zeros(len(level)), steady[:, 0].copy()
         # state of each further law, and where and how fast the mass was before
-        self._laws = [[(0.0, (start, 0.0)) for start in steady[:, 0]] for _ in terms.force.laws]
+        natural = 2 * np.pi * terms.force.core.natural_frequency_hz if terms.force.laws else 0.0
+        self._laws = [[(natural * elapsed_s if law.timed else 0.0, (start, 0.0))
+                       for start in steady[:, 0]] for law in terms.force.laws]
         weight = np.abs(terms.band.taps)
         rest = np.zeros(len(level))
         spread = dataclasses.replace(terms.band, taps=weight)
@@ -298,7 +304,12 @@ class StaticTermsState:
         for row in range(len(q)):
             z, before = self._z[row], self._before[row]
             for i, value in enumerate(q[row].tolist()):
-                z = follow_one_way(z, value - before, force.beta, force.gamma)
+                try:
+                    z = follow_one_way(z, value - before, force.beta, force.gamma)
+                except OverflowError:
+                    z = np.inf
+                if not abs(z) < _LARGEST_Z:
+                    z = 0.0  # no mass goes that far: it begins anew
                 before = value
                 result[row, i] = z
             self._z[row], self._before[row] = z, before

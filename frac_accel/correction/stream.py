@@ -257,9 +257,9 @@ class Stream:
         """What happens to the samples and their variance before the filters; (n, 3) each."""
         return values, variance
 
-    def _after(self, values, index, stamps_ns):
-        """What happens to the samples after the filters; shape (n, 3) in and out."""
-        return values
+    def _after(self, values, variance, index, stamps_ns):
+        """What happens to the samples and their variance after the filters; (n, 3) each."""
+        return values, variance
 
     def _stamps(self, stamps_ns):
         """Stamps of the output from those of the samples that it belongs to."""
@@ -408,7 +408,8 @@ class Stream:
             static, parts = None, ()
             if terms:
                 static = StaticTermsState(terms, columns.mean(axis=1) * (not terms.is_coupled),
-                                          uncertainty.parts if uncertainty else ())
+                                          uncertainty.parts if uncertainty else (),
+                                          1e-9 * (self._waiting_stamps[0] - self._record_start_ns))
                 parts = static.process(columns, variance[:, rows].T)[2]
             doubt = None
             if uncertainty:
@@ -458,7 +459,7 @@ class Stream:
         if len(index):
             self._last_given = int(index[-1])
         self._totals["given"] += len(index)
-        return Filtered(index, self._stamps(stamps), self._after(result, index, stamps), spread)
+        return Filtered(index, self._stamps(stamps), *self._after(result, spread, index, stamps))
 
 
 def _concatenated(parts):

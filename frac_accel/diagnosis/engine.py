@@ -195,7 +195,10 @@ class Engine:
             covariance = sandwich(jacobian[np.ix_(used, felt)], fitted.residual[used], used)
             stds[felt] = np.sqrt(np.maximum(np.diag(covariance), 0))
         result = {}
+        peak = noise_peak(fitted.residual, used)
         for unknown, std in zip(fitted.unknowns, stds):
+            if unknown.jumps:
+                std = self.problem.jump_std(fitted, unknown, peak)
             result.setdefault(unknown.cause, {})[unknown.name] = float(std)
         return result
 

@@ -32,7 +32,7 @@ def force_response(model, effect, motion, sampling_rate_hz, lag_s=0.0):
     ndarray, shape (n,)
     """
     core = model.effective_core
-    force = static_force(effect.add_force(StaticForce()), motion, sampling_rate_hz,
+    force = static_force(effect.add_force(StaticForce(core=core)), motion, sampling_rate_hz,
                          core.natural_frequency_hz)
     convolution = Convolution(force - force[0], sampling_rate_hz, abs(model.delay_s - lag_s))
     s = convolution.s

@@ -44,6 +44,7 @@ class Unknown:
     low: float
     high: float
     step: float
+    jumps: bool = False
 
 
 class Point(NamedTuple):
@@ -233,7 +234,7 @@ class Problem:
         linear = {name: other for name, other in effects.items()
                   if not acts_on_spring(other) and name != cause}
         model = self.axis_model(linear)
-        if acts_on_spring(effect):
+        if acts_on_spring(effect) and type(effect).base_gain is Effect.base_gain:
             motion = self._motion({name: other for name, other in effects.items() if name != cause})
             added = self.force(model, effect, motion)
             if cause in effects:
@@ -435,6 +436,13 @@ class Problem:
         return Point(effects, simulated, columns, free, back @ components, residual,
                      float(residual @ residual))
 
+    def cost(self, effects):
+        """Cost of these causes with the parameters that they have; infinite without a bound."""
+        try:
+            return self._point(effects, False).cost
+        except FracAccelError:
+            return np.inf
+
     def slopes(self, fit):
         """Derivatives of the output by the unknowns of a fit, shape (n, p)."""
         point, theta = fit.whole, fit.theta
@@ -447,6 +455,7 @@ class Problem:
         if forced and (crossed or not fit.rough):
             before = self.simulate(point.effects, False, steps)
         for i, unknown in enumerate(fit.unknowns):
+            sides = []
             for step in (unknown.step, -unknown.step):
                 moved = theta.copy()
                 moved[i] = np.clip(theta[i] + step, unknown.low, unknown.high)
@@ -466,9 +475,35 @@ class Problem:
                 free = self.free_columns(new)
                 if free is not point.columns and free.shape == point.columns.shape:
                     change = change + (free - point.columns) @ point.left
-                columns[:, i] = change / (moved[i] - theta[i])
-                break
+                sides.append((moved[i] - theta[i], change))
+                if not unknown.jumps:
+                    break
+            if len(sides) == 2:
+                (up, more), (down, less) = sides
+                columns[:, i] = (more - less) / (up - down)
+            elif sides:
+                columns[:, i] = sides[0][1] / sides[0][0]
         return self.clear(columns, point.free)
+
+    def jump_std(self, fit, unknown, peak):
+        """Standard uncertainty of an instant at which something jumps, by the cost around it.
+
+        A quarter of the range in which the cost stays within four variances of the noise, times
+        the `peak` of its density; at least that of an instant between two samples.
+        """
+        limit = fit.cost * (1 + 4 * peak / self.count)
+        here, width = getattr(fit.effects[unknown.cause], unknown.name), 0.0
+        for side in (-1, 1):
+            away = 0.5 / self.rate
+            while away < self.time[-1]:
+                moved = dataclasses.replace(fit.effects[unknown.cause],
+                                            **{unknown.name: max(here + side * away, 0.0)})
+                point = self._point({**fit.effects, unknown.cause: moved}, False)
+                if point.cost > limit:
+                    break
+                away *= 1.5
+            width += away
+        return max(width / 4, 1 / (np.sqrt(12) * self.rate))
 
     def replaced(self, effects, unknowns, theta):
         """Effects with the values of the unknowns."""
@@ -503,12 +538,34 @@ class Problem:
             span = 1e-3 if np.isfinite(low) and np.isfinite(high) else 0
             low, high = low / scale + span, high / scale - span
         return Unknown(effect.cause, field.name, logarithmic, scale, low, high,
-                       limits["step"] or _STEP)
+                       limits["step"] or _STEP, limits["jumps"])
 
     @functools.cached_property
     def scales(self):
         """What is small or large in this record."""
         return Scales(float(np.std(self.measured[self.used])), self.rate, float(self.time[-1]))
+
+    @functools.cached_property
+    def mixing(self):
+        """How much of each axis is in each other one, by least squares on the model in use.
+
+        Matrix, shape (3, 3): row i has the shares of the axes' simulated outputs in the measured
+        axis i, NaN where either does not move; and the standard uncertainties as for white noise.
+        """
+        moving = [axis for axis in range(3) if np.ptp(self.record.reference[:, axis])]
+        shares, stds = np.full((2, 3, 3), np.nan)
+        columns = [self.simulator(axis).respond(self.baseline.axis(axis))[self.used]
+                   for axis in moving]
+        basis = np.stack([*columns, np.ones(self.count)], axis=1)
+        inverse = np.linalg.pinv(basis.T @ basis)
+        for axis in range(3):
+            measured = self.record.sensor[self.used, axis]
+            if np.ptp(measured):
+                found = inverse @ (basis.T @ measured)
+                noise = np.var(measured - basis @ found)
+                shares[axis, moving] = found[:-1]
+                stds[axis, moving] = np.sqrt(noise * np.diag(inverse)[:-1])
+        return shares, stds
 
     @functools.cached_property
     def excited(self):

@@ -45,6 +45,7 @@ class View:
     warms: bool
     excited: dict
     axis: str
+    mixing: tuple = None
 
 
 class Search:
@@ -130,7 +131,8 @@ class Search:
                     float(np.std(fitted.simulated[p.used])),
                     celsius is not None and np.ptp(celsius) > 0.1,
                     p.excited,
-                    "xyz"[p.axis])
+                    "xyz"[p.axis],
+                    p.mixing)
 
     def screen(self, fitted):
         """List of (cost to be expected, cause, effect to begin with), best start of each cause."""
@@ -247,6 +249,10 @@ class Search:
     def without(self, fitted, cause, goal=np.inf):
         """The same set without one cause, fitted anew; not to the end if no pace to a goal."""
         less = {name: effect for name, effect in fitted.effects.items() if name != cause}
+        known = self.fits.get(frozenset(less))
+        if known is not None and known.cost > goal and self.problem.cost(less) < known.cost:
+            # that fit had ended in another valley
+            del self.fits[known.causes]
         return next(iter(self.fit_all([less], fitted.cost, goal)), None) or self.fit(less)
 
 

@@ -221,6 +221,13 @@ class Effect:
         """Time that passes while the stamps advance by one second."""
         return 1.0
 
+    def time_steps(self):
+        """Instants [s] of the sensor's clock at which its stamps jump, and by how much [s] each.
+
+        From there on, the value stamped t belongs to t less that.
+        """
+        return ()
+
     def change_core(self, core):
         """Core as this effect leaves it."""
         return core
@@ -228,6 +235,13 @@ class Effect:
     def add_force(self, force):
         """`StaticForce` of the core's spring as this effect leaves it."""
         return force
+
+    def base_gain(self, time_s):
+        """Gain of the base's acceleration before the core, at times [s] since the record's start.
+
+        A number or an array of the times' shape.
+        """
+        return 1.0
 
     def transfer_function(self, s):
         """Linear link's transfer function at complex `s` [rad/s], without its pure delay."""

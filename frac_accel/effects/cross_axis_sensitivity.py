@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..parameters import parameter
+from .axis_turn import turn_of
 from .base import CROSS_AXIS, Effect
 from .fit_starts import Start
 
@@ -44,16 +45,18 @@ class CrossAxisSensitivity(Effect):
 
     @classmethod
     def simulate_axes(cls, values, by_axis, circumstances):
-        return _mix(values, cls.matrix(by_axis))
+        return mix(values, cls.matrix(by_axis))
 
     @classmethod
     def invert_axes(cls, values, variance, by_axis, circumstances):
         inverse = _inverse(tuple(by_axis.items()))
-        return _mix(values, inverse), _mix(variance, inverse**2)
+        return mix(values, inverse), mix(variance, inverse**2)
 
     @classmethod
     def starts(cls, view):
         others = [axis for axis in "xyz" if view.excited[axis] and axis != view.axis]
+        if turn_of(view) is not None:
+            return []  # what each axis has of the others, these have of it with the other sign
         return [Start(cls(**dict.fromkeys(others, 1e-3)),
                       tuple(cls(**{axis: 1e-3}) for axis in others), "free")] if others else []
 
@@ -67,6 +70,6 @@ def _inverse(by_axis):
     return np.linalg.inv(matrix)
 
 
-def _mix(values, matrix):
+def mix(values, matrix):
     """values @ matrix.T, summed in a fixed order: BLAS would round by the block's length."""
     return sum(values[:, [axis]] * matrix[:, axis] for axis in range(3))

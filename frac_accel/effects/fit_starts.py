@@ -11,6 +11,8 @@ import numpy as np
 # [samples].
 _LONGEST_SEGMENT = 1024
 _MOST_DELAY = 8
+# Samples that must count on either side of an instant at which something is to have changed.
+_SIDE = 32
 
 
 class Start(NamedTuple):
@@ -138,3 +140,46 @@ def strongest_line(view):
     basis = np.stack([np.sin(wave), np.cos(wave)], axis=1) * view.used[:, None]
     sine, cosine = np.linalg.lstsq(basis, values, rcond=None)[0]
     return float(frequency), float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
+
+
+def jumps(view, shape):
+    """Where the residual begins to hold more of a shape, or less, and how much.
+
+    The instant is that at which least squares with another factor of the shape on either side gain
+    most (cumulative sums, O(n)): D. V. Hinkley, *Biometrika* 57 (1970) 1-17.
+
+    Parameters
+    ----------
+    view : diagnosis.search.View
+    shape : ndarray, shape (n,)
+
+    Returns
+    -------
+    list of tuple of float
+        Instant [s] and change: with the part before it free, and with nothing there. None where
+        there are not enough samples.
+    """
+    shared = np.cumsum(np.where(view.used, view.residual * shape, 0.0))
+    power = np.cumsum(np.where(view.used, shape**2, 0.0))
+    count = np.cumsum(view.used)
+    inner = np.flatnonzero((count[:-1] >= _SIDE) & (count[-1] - count[:-1] >= _SIDE)
+                           & (power[:-1] > 0) & (power[:-1] < power[-1]))
+    if not len(inner):
+        return []
+    before = shared[inner] / power[inner]
+    after = (shared[-1] - shared[inner]) / (power[-1] - power[inner])
+    beyond = power[-1] - power[inner]
+    best = inner[np.argmax(before**2 * power[inner] + after**2 * beyond)]
+    alone = inner[np.argmax(after**2 * beyond)]
+    changes = dict(zip(inner, after - before)), dict(zip(inner, after))
+    return [(float((place + 0.5) / view.rate), float(change[place]))
+            for place, change in zip((best, alone), changes)]
+
+
+def jump_between(view, before, after):
+    """Instant [s] from which on another error is the smaller one, by least squares; or None."""
+    gained = np.cumsum(np.where(view.used, after**2 - before**2, 0.0))
+    inner = slice(_SIDE, -_SIDE)
+    if len(gained[inner]) == 0:
+        return None
+    return float((_SIDE + np.argmax(gained[inner]) + 0.5) / view.rate)

@@ -2,7 +2,6 @@
 
 import dataclasses
 
-from ..errors import ModelError
 from ..parameters import parameter
 from .base import CORE, Effect, require_oscillator
 from .fit_starts import positive
@@ -14,7 +13,9 @@ class Hysteresis(Effect):
 
     .. math:: z' = q' - \beta |q'| z - \gamma q' |z|
 
-    R. Bouc (1967); Y.-K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249-263.
+    R. Bouc (1967); Y.-K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249-263. With beta + gamma below 0
+    the branches bend away from the middle, and z has a bound only as long as the motion has one
+    (F. Ikhouane, J. Rodellar, *Systems with Hysteresis* (2007), table 2.1).
     """
 
     cause = "hysteresis"
@@ -27,12 +28,6 @@ class Hysteresis(Effect):
     beta: float = parameter("1/(output units)", scale="per_level", minimum=0)
     gamma: float = parameter("1/(output units)", scale="per_level")
 
-    def __post_init__(self):
-        # F. Ikhouane, J. Rodellar, Systems with Hysteresis (2007), table 2.1: else z has no bound
-        if self.beta + self.gamma < 0:
-            raise ModelError(f"effects: hysteresis with gamma {self.gamma:g} given, expected at "
-                             f"least -beta ({-self.beta:g})")
-
     def change_core(self, core):
         return require_oscillator(core, self.cause)
 
@@ -42,4 +37,4 @@ class Hysteresis(Effect):
     @classmethod
     def starts(cls, view):
         return [positive(cls(0.02, beta / view.level, share * beta / view.level), "strength")
-                for beta in (0.3, 1.0, 3.0) for share in (-0.4, 0.4)]
+                for beta in (0.3, 1.0, 3.0) for share in (-1.4, -0.4, 0.4)]

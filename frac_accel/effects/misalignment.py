@@ -1,0 +1,105 @@
+"""Sensor that is turned against the reference."""
+
+import dataclasses
+
+import numpy as np
+
+from ..parameters import parameter
+from .axis_turn import turn_of
+from .base import CROSS_AXIS, Effect
+from .cross_axis_sensitivity import mix
+from .fit_starts import finite
+
+_AXES = "xyz"
+# Share of an axis that counts as the whole, for words.
+_WHOLE = 0.97
+
+
+@dataclasses.dataclass(frozen=True)
+class Misalignment(Effect):
+    r"""Orientation of the sensor in the reference's frame (REP 103: fixed axes, right-handed).
+
+    :math:`R = R_z(\text{yaw}) R_y(\text{pitch}) R_x(\text{roll})` turns a vector's components in
+    the sensor's axes into those in the reference's; the sensor says
+    :math:`R^T a_\text{reference}`. With all three axes alike, the turn acts on their outputs as it
+    does on the acceleration.
+    """
+
+    cause = "misalignment"
+    stage = CROSS_AXIS
+    explanation = ("The sensor is turned against the reference; by quarter turns, axes are "
+                   "exchanged or have the opposite sign.")
+    experiment = ("Record at rest in several positions: gravity shows the axes of both. A turn "
+                  "keeps the sum of the squares of all axes, a cross-axis sensitivity does not.")
+
+    common_to_axes = True
+
+    roll_deg: float = parameter("deg", minimum=-360, maximum=360, default=0.0, scale=57.3, null=0.0)
+    pitch_deg: float = parameter("deg", minimum=-360, maximum=360, default=0.0, scale=57.3,
+                                 null=0.0)
+    yaw_deg: float = parameter("deg", minimum=-360, maximum=360, default=0.0, scale=57.3, null=0.0)
+
+    def __post_init__(self):
+        words = [words for words in map(self.in_words, range(3)) if words]
+        if words:
+            # frozen: said once, of this turn
+            object.__setattr__(self, "explanation", f"{type(self).explanation[:-1]}: "
+                               f"{', '.join(words)}.")
+
+    @property
+    def rotation(self):
+        """R, shape (3, 3): from the sensor's axes to the reference's."""
+        (sx, cx), (sy, cy), (sz, cz) = ((np.sin(a), np.cos(a)) for a in np.radians(
+            [self.roll_deg, self.pitch_deg, self.yaw_deg]))
+        about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+        about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+        about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+        return about_z @ about_y @ about_x
+
+    def share_of_axes(self, axis):
+        return self.rotation[:, axis]
+
+    def in_words(self, axis):
+        """What has become of an axis (0, 1, 2) where it is another one, or turned over; or None."""
+        shares = self.share_of_axes(axis)
+        most = int(np.argmax(np.abs(shares)))
+        if abs(shares[most]) < _WHOLE or (most == axis and shares[most] > 0):
+            return None
+        sign = "" if shares[most] > 0 else "minus "
+        return f"the sensor's {_AXES[axis]} is the reference's {sign}{_AXES[most]}"
+
+    @classmethod
+    def fitted_parameters(cls, axis, excited):
+        """The angles that turn other excited axes into this one; x does not see a roll."""
+        others = [other for other in _AXES if other != axis and excited[other]]
+        return sorted({_ABOUT[frozenset(axis + other)] for other in others})
+
+    @classmethod
+    def matrix(cls, by_axis):
+        """3 by 3 matrix that turns outputs of straight axes into those of the turned ones."""
+        matrix = np.eye(3)
+        for axis, effect in by_axis.items():
+            matrix[axis] = effect.share_of_axes(axis)
+        return matrix
+
+    @classmethod
+    def simulate_axes(cls, values, by_axis, circumstances):
+        return mix(values, cls.matrix(by_axis))
+
+    @classmethod
+    def invert_axes(cls, values, variance, by_axis, circumstances):
+        matrix = cls.matrix(by_axis)
+        if abs(np.linalg.det(matrix)) < 1e-3:
+            # one axis was diagnosed alone, and is another one: that one is not known twice
+            return values, variance
+        inverse = np.linalg.inv(matrix)
+        return mix(values, inverse), mix(variance, inverse**2)
+
+    @classmethod
+    def starts(cls, view):
+        turn = turn_of(view)
+        return [] if turn is None else [finite(cls(*turn))]
+
+
+# The angle that mixes two axes where it is small.
+_ABOUT = {frozenset("yz"): "roll_deg", frozenset("xz"): "pitch_deg", frozenset("xy"): "yaw_deg"}

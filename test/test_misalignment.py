@@ -1,0 +1,75 @@
+"""A turned sensor: REP 103, told from a cross-axis sensitivity by what all axes say."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from second_set_bench import RATE, Multisine, model, samples, times
+
+from frac_accel import Corrector, simulate
+from frac_accel.diagnosis import diagnose
+
+N = 8000
+
+
+def motion(seed):
+    rng = np.random.default_rng(seed)
+    sines = [Multisine(rng) for _ in range(3)]
+    t = times(N / RATE)
+    return (rng, t, np.stack([sine.acceleration(t) for sine in sines], axis=1),
+            np.stack([sine.motion(t) for sine in sines], axis=1))
+
+
+def turned(values, roll, pitch, yaw):
+    """Components in the axes of a body turned about the fixed x, then y, then z."""
+    return Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=True).inv().apply(values)
+
+
+def found(t, reference, values, axis="x"):
+    return diagnose((samples(t, reference), samples(t, values)), model(), axis)
+
+
+@pytest.mark.parametrize("angles", [(3.0, -4.0, 5.0), (90.0, 0.0, 0.0), (20.0, 50.0, -160.0)])
+def test_simulated_as_scipy_turns_it_and_turned_back(angles):
+    _, t, reference, _ = motion(1)
+    names = ("roll_deg", "pitch_deg", "yaw_deg")
+    turn = {"cause": "misalignment", **dict(zip(names, angles))}
+    np.testing.assert_allclose(simulate(model(turn), reference, RATE),
+                               simulate(model(), turned(reference, *angles), RATE), atol=1e-9)
+    made = samples(t, simulate(model(turn), reference, RATE))
+    parts = [Corrector(model(turn), RATE, noise_std=0.01) for _ in range(2)]
+    whole = parts[0].process(made.stamps_ns, made.values)
+    cut = [parts[1].process(made.stamps_ns[a:b], made.values[a:b])
+           for a, b in ((0, 1), (1, 2500), (2500, N))]
+    assert np.array_equal(whole.values, np.concatenate([part.values for part in cut]))
+    error = (whole.values - reference[whole.index])[300:-300]
+    assert np.std(error) < 0.02 * np.std(reference)
+
+
+@pytest.mark.parametrize("angles", [(1.0, -2.0, 3.0), (12.0, -9.0, -7.0)])
+def test_found_again_and_nothing_else(angles):
+    rng, t, reference, output = motion(2)
+    values = turned(output, *angles) + 0.01 * rng.normal(size=(N, 3))
+    diagnosis = found(t, reference, values)
+    assert [finding.cause for finding in diagnosis.findings] == ["misalignment"]
+    effect = diagnosis.findings[0].effect
+    np.testing.assert_allclose([effect.roll_deg, effect.pitch_deg, effect.yaw_deg], angles,
+                               atol=0.1)
+
+
+@pytest.mark.parametrize("shares", [{"y": 0.03}, {"y": 0.05, "z": -0.04}])
+def test_a_cross_axis_sensitivity_is_no_turn(shares):
+    rng, t, reference, output = motion(3)
+    values = output + 0.01 * rng.normal(size=(N, 3))
+    for axis, share in shares.items():
+        values[:, 0] += share * output[:, "xyz".index(axis)]
+    for sensor in (values, values * [1, 0, 0]):
+        diagnosis = found(t, reference, sensor)
+        assert [f.cause for f in diagnosis.findings] == ["cross_axis_sensitivity"]
+
+
+def test_exchanged_axes_are_said_in_words():
+    effect = model({"cause": "misalignment", "yaw_deg": 90.0}).axes[0].effects[0]
+    assert "the sensor's x is the reference's y" in effect.explanation
+    assert "the sensor's y is the reference's minus x" in effect.explanation
+    slight = model({"cause": "misalignment", "yaw_deg": 2.0}).axes[0].effects[0]
+    assert slight.explanation == type(slight).explanation
