@@ -6,6 +6,8 @@ import importlib
 # libraries, nor a notebook for those of the bags.
 _HOME = {
     "SensorModel": "model",
+    "Effect": "effects.base",
+    "check_effect": "effect_checks",
     "simulate": "simulation",
     "identify": "identification",
     "diagnose": "diagnosis",

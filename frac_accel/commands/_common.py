@@ -40,8 +40,8 @@ def add_topics(parser, axis=True):
 def add_temperature(parser):
     """Which topic holds the temperature."""
     parser.add_argument("--temperature", default=TEMPERATURE_TOPIC, metavar="TOPIC",
-                        help="topic of the sensor's temperature, which a model with "
-                             "temperature_sensitivity needs (default: %(default)s)")
+                        help="topic of the sensor's temperature, for models that depend on it "
+                             "(default: %(default)s)")
 
 
 def read_temperature_at(reader, topic):

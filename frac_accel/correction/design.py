@@ -256,8 +256,8 @@ def _clock_ratio(model):
     """Ratio of the sensor's clock, which is one for all axes."""
     ratios = {axis.clock_ratio for axis in model.axes}
     if len(ratios) > 1:
-        raise DesignError("effects: clock_skew differs between the axes, but a sample has one "
-                          "stamp for all of them")
+        raise DesignError("effects: the clock's rate differs between the axes, but a sample has "
+                          "one stamp for all of them")
     return ratios.pop()
 
 
