@@ -16,6 +16,7 @@ VERBS = {
     "validate": "error metrics of a model and of its correction",
     "correct": "raw acceleration -> corrected acceleration",
     "diagnose": "what a simulation gets wrong, the cause, the extension, the gain",
+    "report": "the page of a diagnosis again, from its result file",
     "paper": "the seed paper's tables and figures again, and the audit of its claims",
     "bench": "speed, latency and memory, beside peers in the same run",
 }

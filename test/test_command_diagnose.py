@@ -20,7 +20,8 @@ ERRORS = {"rmse", "nrmse"}
 KEYS = {"verdict": str, "baseline": dict, "findings": list, "extended": dict,
         "unexplained_fraction": float}
 # What the result file has beyond the fixed form.
-FURTHER = {"reason": str, "suspects": list, "integrity": list}
+FURTHER = {"reason": str, "suspects": list, "integrity": list, "data": dict,
+           "sensor_model": dict, "evidence": dict, "provenance": dict}
 FINDING = {"cause", "parameters", "confidence", "confusable_with", "evidence", "explanation",
            "gain"}
 GAIN = {"held_out_rmse_before", "held_out_rmse_after", "reduction", "ci95"}

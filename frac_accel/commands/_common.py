@@ -4,6 +4,7 @@ import argparse
 import hashlib
 import json
 import math
+import re
 import sys
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from ..bag import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC, BagReader
 from ..errors import BagError, FracAccelError
 from ..parameters import plain
 from ..report import require_plotly
+
+_NUMBERS = re.compile(r"\[([-+.\deEnul,\s]*)\]")
 
 
 def add_bag(parser):
@@ -111,6 +114,8 @@ def write_json(path, result):
     if path is None:
         return
     text = json.dumps(_without_nan(plain(result)), indent=1, allow_nan=False)
+    # a list of numbers is one line, not one for each
+    text = _NUMBERS.sub(lambda found: f"[{' '.join(found[1].split())}]", text)
     try:
         Path(path).write_text(text + "\n", encoding="utf-8")
     except OSError as error:

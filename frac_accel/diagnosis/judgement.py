@@ -11,6 +11,7 @@ from ..effects import known_effects
 from ..model import AXES, AxisModel, SensorModel
 from ..pair import clean
 from ..parameters import parameter_fields
+from .evidence import Evidence
 from .experiments import separating_experiment
 from .gain import gain
 
@@ -91,6 +92,8 @@ class Diagnosis:
     model : SensorModel
         The model in use, extended by what was found.
     integrity : Integrity
+    evidence : Evidence or None
+        What it rests on, for its page; None where nothing was fitted.
     """
 
     verdict: str
@@ -102,8 +105,7 @@ class Diagnosis:
     unexplained_fraction: float
     model: object
     integrity: object
-    engine: object = None
-    best: object = None
+    evidence: Evidence | None = None
 
     def as_dict(self, model_file=None):
         """As the result file has it."""
@@ -112,7 +114,23 @@ class Diagnosis:
                 "suspects": self.suspects,
                 "extended": {**self.extended, "model": model_file},
                 "unexplained_fraction": self.unexplained_fraction,
-                "integrity": self.integrity.words}
+                "integrity": self.integrity.words,
+                "data": {key: value for key, value in dataclasses.asdict(self.integrity).items()
+                         if key != "words"},
+                "sensor_model": self.model.to_dict() if self.model is not None else None,
+                "evidence": self.evidence.as_dict() if self.evidence is not None else None}
+
+    @classmethod
+    def from_dict(cls, data):
+        """Inverse of `as_dict`.
+
+        Raises
+        ------
+        FracAccelError
+            If it is no result of a diagnosis, or names a cause that is not installed.
+        """
+        from .result import diagnosis_from
+        return diagnosis_from(data)
 
 
 def insufficient(reason, model, found):
@@ -262,7 +280,8 @@ def _verdict(engine, best, left, findings, suspects, found):
         {"rmse": errors["baseline"], "nrmse": errors["baseline"] / spread, "noise_rms": noise},
         findings, suspects,
         {"rmse": errors["extended"], "nrmse": errors["extended"] / spread},
-        float(min(fraction, 1.0)), model, found, engine, best)
+        float(min(fraction, 1.0)), model, found,
+        Evidence.of(engine, best, {f.cause: f.effect for f in findings}))
 
 
 def _extended(engine, effects):
