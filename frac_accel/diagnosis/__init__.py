@@ -1,10 +1,11 @@
 """What a simulation gets wrong, which cause explains it, and what the extended model gains."""
 
-from pathlib import Path
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from ..bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
+from ..bag import RAW_TOPIC, REFERENCE_TOPIC
 from ..core import Oscillator
 from ..effects import known_effects
 from ..errors import FracAccelError, IdentificationError
@@ -13,6 +14,7 @@ from ..identification.record_checks import moving_samples
 from ..model import AXES, SensorModel
 from ..pair import Pair
 from ..simulation import AxisSimulator
+from ..sources import pair_of
 from . import integrity
 from .engine import Engine
 from .judgement import Diagnosis, Finding, insufficient, judge
@@ -32,14 +34,16 @@ _EXCHANGED = 0.3
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
 
-def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE_TOPIC,
-             sensor=RAW_TOPIC, progress=None):
+def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
+             temperature: tuple | None = None, reference: str = REFERENCE_TOPIC,
+             sensor: str = RAW_TOPIC, progress: Callable | None = None,
+             sampling_rate_hz: float | None = None) -> Diagnosis:
     """Find what a simulation gets wrong, and why.
 
     Parameters
     ----------
-    source : str, Path or tuple of Samples
-        A bag, or the samples of reference and sensor.
+    source : str, Path or tuple
+        A bag, or (reference, sensor) as `Samples` or as arrays of shape (n,) or (n, 3).
     model : SensorModel, optional
         The model in use; without it a classical one is identified first.
     axis : {"x", "y", "z"}
@@ -49,6 +53,8 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
         Topics, where `source` is a bag.
     progress : callable, optional
         Called with a few words before each step.
+    sampling_rate_hz : float, optional
+        Of arrays [Hz].
 
     Returns
     -------
@@ -58,16 +64,23 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     ------
     FracAccelError
         If the record cannot be used, the sensor does not follow the reference, or no classical
-        model can be identified although the excitation would do.
+        model can be identified although the excitation would do; if arrays are no pair: wrong
+        shapes, values that are not finite, or no rate.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> found = frac_accel.diagnose("bags/soft_mount.mcap",
+    ...                             frac_accel.SensorModel.load("bags/soft_mount.yaml"))
+    >>> [finding.cause for finding in found.findings]
+    ['time_delay', 'cubic_stiffness']
     """
     progress = progress or (lambda words: None)
-    if isinstance(source, (str, Path)):
-        topics = read_bag(source, [reference, sensor])
-        source = topics[reference], topics[sensor]
+    pair = pair_of(source, sampling_rate_hz, axis, reference, sensor)
     column = AXES.index(axis)
     progress("checking the data")
-    record = Record.of(*source, axis, temperature)
-    found = integrity.check(source[1], record.sampling_rate_hz, column)
+    record = Record.of(pair[0], pair[1], axis, temperature)
+    found = integrity.check(pair[1], record.sampling_rate_hz, column)
     if len(record) < _FEWEST:
         return insufficient(f"the record has {len(record)} samples, expected at least {_FEWEST}",
                             model, found)
@@ -100,7 +113,7 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
                     [cause for cause, effect in known_effects().items()
                      if not effect.read_off], progress, found.step)
     _require_relation(engine, axis, seed)
-    return judge(engine, engine.run(seed), found, shown, loose, source[1])
+    return judge(engine, engine.run(seed), found, shown, loose, pair[1])
 
 
 def _shown(found, measured):

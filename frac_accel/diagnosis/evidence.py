@@ -135,6 +135,16 @@ class Evidence:
             len(search.fits), sorted(search.base), _rivals(engine, best), signals, int(length),
             _density(p, residuals), _by_size(p, residuals), _by_time(p, residuals))
 
+    def draw(self, figure):
+        """Signals and residuals into a matplotlib figure."""
+        kinds = self.signals["whole"]
+        for axes, (kind, by_name) in zip(figure.subplots(2, sharex=True), kinds.items()):
+            for name, (time, values) in by_name.items():
+                axes.plot(time, values, label=name, linewidth=0.8)
+            axes.set_ylabel(f"{kind} [output units]")
+            axes.legend(loc="upper right")
+        axes.set_xlabel("time [s]")
+
     def as_dict(self):
         """As the result file has it."""
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}

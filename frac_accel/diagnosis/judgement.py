@@ -11,6 +11,7 @@ from ..effects import known_effects
 from ..model import AXES, AxisModel, SensorModel
 from ..pair import clean
 from ..parameters import parameter_fields
+from ..shown import Shown
 from .evidence import Evidence
 from .experiments import separating_experiment
 from .gain import gain
@@ -72,7 +73,7 @@ class Finding:
 
 
 @dataclasses.dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Shown):
     """What was found about one axis.
 
     Attributes
@@ -106,6 +107,14 @@ class Diagnosis:
     model: object
     integrity: object
     evidence: Evidence | None = None
+
+    def __repr__(self):
+        causes = ", ".join(finding.cause for finding in self.findings)
+        return f"<Diagnosis: {self.verdict}{': ' if causes else ''}{causes}; {self.reason}>"
+
+    def _draw(self, figure):
+        if self.evidence is not None:
+            self.evidence.draw(figure)
 
     def as_dict(self, model_file=None):
         """As the result file has it."""

@@ -167,8 +167,8 @@ def inverts_motion(cls, draws):
         model = SensorModel(CORE, [effect])
         try:
             corrector = Corrector(model, RATE)
-        except DesignError as error:
-            refusal = error
+        except DesignError as failure:
+            refusal = str(failure)
             continue
         low = 2 * max(axis.band_hz[0] for axis in corrector.design.axes) / RATE
         high = 0.9 * min(axis.band_hz[1] for axis in corrector.design.axes) / RATE
