@@ -24,7 +24,7 @@ setup(
     maintainer="frac_accel developers",
     maintainer_email="maintainers@frac-accel.example",
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["**/*.msg", "**/*.yaml", "**/*.html"]},
+    package_data={PACKAGE: ["**/*.msg", "**/*.yaml", "**/*.html", "py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),

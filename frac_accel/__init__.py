@@ -6,7 +6,11 @@ import importlib
 # libraries, nor a notebook for those of the bags.
 _HOME = {
     "SensorModel": "model",
+    "Effect": "effects.base",
+    "check_effect": "effect_checks",
     "simulate": "simulation",
+    "correct": "offline",
+    "validate": "validation",
     "identify": "identification",
     "diagnose": "diagnosis",
     "design_inverse": "correction.design",
@@ -23,10 +27,16 @@ _HOME = {
     "Orientation": "record.orientation",
 }
 
-__all__ = sorted(_HOME)
+__all__ = sorted(_HOME)  # and __version__
 
 
 def __getattr__(name):
+    if name == "__version__":
+        from importlib.metadata import PackageNotFoundError, version
+        try:
+            return version("frac_accel")
+        except PackageNotFoundError:
+            return "not installed"
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -17,6 +17,7 @@ VERBS = {
     "correct": "raw acceleration -> corrected acceleration",
     "budget": "what is left, parted by kind, in seconds, without naming anything",
     "diagnose": "what a simulation gets wrong, the cause, the extension, the gain",
+    "report": "the page of a diagnosis again, from its result file",
     "paper": "the seed paper's tables and figures again, and the audit of its claims",
     "bench": "speed, latency and memory, beside peers in the same run",
 }

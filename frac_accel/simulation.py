@@ -1,6 +1,7 @@
 """Simulation of a sensor model from a sampled reference."""
 
 import functools
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +10,9 @@ from .core import Arx
 from .core.modes import modes_of
 from .effects.base import CORE, GAIN, Circumstances
 from .errors import FracAccelError, ModelError
-from .model import AXES
+from .model import AXES, SensorModel
+from .record.samples import Samples
+from .sources import is_bag
 
 # Factor by which the response of a linear sensor is refined before it is read between samples.
 _REFINED = 4
@@ -23,15 +26,18 @@ _FEW_STEPS = 4
 _BEYOND = 8
 
 
-def simulate(model, reference, sampling_rate_hz, axis=None, initial="rest", temperature_c=None):
+def simulate(model: SensorModel, reference: Any, sampling_rate_hz: float | None = None,
+             axis: str | None = None, initial: str = "rest", temperature_c: Any = None) -> Any:
     """Output of a sensor, from the acceleration of its base.
 
     Parameters
     ----------
     model : SensorModel
-    reference : array_like, shape (n, 3) or (n,)
-        Acceleration [m/s²] at uniform instants; one column needs `axis`.
-    sampling_rate_hz : float
+    reference : array_like, shape (n, 3) or (n,), or str or Path
+        Acceleration [m/s²] at uniform instants; one column needs `axis`. Or a bag, of which the
+        default topic of the reference is taken.
+    sampling_rate_hz : float, optional
+        Needed by an array.
     axis : {"x", "y", "z"}, optional
         The axis of a one-column reference. The other two axes are then at rest.
     initial : {"rest", "steady"}
@@ -41,22 +47,35 @@ def simulate(model, reference, sampling_rate_hz, axis=None, initial="rest", temp
 
     Returns
     -------
-    ndarray, same shape as `reference`
+    ndarray, same shape as `reference`, or Samples of a bag
         Output in the sensor's units at the same instants. Lost samples and scattering stamps
         change no value.
 
     Raises
     ------
     FracAccelError
-        If the reference is not finite, empty or of the wrong shape, the temperature is missing, or
-        the motion of a nonlinear model grows without bound.
+        If the reference is not finite, empty or of the wrong shape, rate or temperature are
+        missing, or the motion of a nonlinear model grows without bound.
     ModelError
         If an ``arx`` core holds at a lower rate than the record's.
 
     Notes
     -----
     See `AxisSimulator`.
+
+    Examples
+    --------
+    >>> import numpy as np, frac_accel
+    >>> from frac_accel.core import Oscillator
+    >>> model = frac_accel.SensorModel(Oscillator(200.0, 0.5, sensitivity=2.0))
+    >>> steady = frac_accel.simulate(model, np.full(100, 9.81), 1000.0, "x", initial="steady")
+    >>> round(float(steady[-1]), 3)
+    19.62
     """
+    if is_bag(reference):
+        return _of_bag(model, reference, initial, temperature_c)
+    if sampling_rate_hz is None:
+        raise FracAccelError("sampling_rate_hz: missing, expected the rate of the reference in Hz")
     values = np.asarray(reference, float)
     single = values.ndim == 1
     if single:
@@ -74,6 +93,16 @@ def simulate(model, reference, sampling_rate_hz, axis=None, initial="rest", temp
         result[:, i] = simulator.respond(axis_model)
     result = model.live_simulation(sampling_rate_hz)(result, simulator.circumstances)
     return result[:, column] if single else result
+
+
+def _of_bag(model, bag, initial, temperature_c):
+    from .bag import REFERENCE_TOPIC, read_bag
+    from .record.record import UniformSamples
+    samples = read_bag(bag, [REFERENCE_TOPIC])[REFERENCE_TOPIC]
+    record = UniformSamples.of(samples, f"{bag}: topic {REFERENCE_TOPIC}")
+    output = simulate(model, record.values, record.sampling_rate_hz, initial=initial,
+                      temperature_c=temperature_c)[record.slot]
+    return Samples.of(samples.stamps_ns[record.index], output, frame_id=samples.frame_id)
 
 
 class AxisSimulator:

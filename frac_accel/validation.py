@@ -1,6 +1,8 @@
 """How good a model is on a measured pair: its simulation, and the correction that it gives."""
 
 import dataclasses
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -9,10 +11,13 @@ from .correction.design import plateau
 from .errors import FracAccelError
 from .identification.excitation import excited_band
 from .metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
-from .model import AXES
+from .model import AXES, SensorModel
 from .record import Record, Samples
 from .reference import restored
+from .shown import Shown
 from .simulation import simulate
+from .sources import pair_of
+from .thinning import envelope
 
 # A stamp that has been moved by a skew and back.
 _ROUNDING_NS = 2
@@ -40,7 +45,7 @@ class Comparison:
 
 
 @dataclasses.dataclass(frozen=True)
-class Validation:
+class Validation(Shown):
     """Errors of a model and of its correction on one axis of a measured pair.
 
     Attributes
@@ -60,6 +65,23 @@ class Validation:
     filters: dict
     counters: dict
 
+    def __repr__(self):
+        return (f"<Validation: simulation {self.simulation.total.nrmse:.3%}, correction "
+                f"{self.comparison.corrected.total.nrmse:.3%} (NRMSE)>")
+
+    def _draw(self, figure):
+        seen = self.comparison
+        time = (seen.stamps_ns - seen.stamps_ns[0]) * 1e-9
+        upper, lower = figure.subplots(2, sharex=True)
+        for axes, signals in ((upper, {"reference": seen.reference, "corrected": seen.after}),
+                              (lower, {"raw / sensitivity": seen.before - seen.reference,
+                                       "corrected": seen.after - seen.reference})):
+            for name, values in signals.items():
+                axes.plot(*envelope(time, values), label=name, linewidth=0.8)
+            axes.legend(loc="upper right")
+        upper.set_ylabel("acceleration [m/s²]")
+        lower.set(xlabel="time [s]", ylabel="error [m/s²]")
+
     def as_dict(self):
         """Plain numbers, without the compared signals."""
         return {"simulation": self.simulation.as_dict(),
@@ -68,17 +90,21 @@ class Validation:
                 "filters": self.filters, "counters": self.counters}
 
 
-def validate(reference, sensor, model, axis="x", temperature_at=None, **wishes):
+def validate(source: Any, model: SensorModel, axis: str = "x",
+             temperature_at: Callable | None = None, sampling_rate_hz: float | None = None,
+             **wishes: Any) -> Validation:
     """Judge a model on a measured pair, the reference without the model's `reference_faults`.
 
     Parameters
     ----------
-    reference, sensor : Samples
+    source : str, Path or tuple
+        A bag, or (reference, sensor) as `Samples` or as arrays of shape (n,) or (n, 3).
     model : SensorModel
     axis : {"x", "y", "z"}
     temperature_at : callable, optional
-        Temperature [°C] at an array of stamps [ns]; needed by a model with
-        temperature_sensitivity.
+        Temperature [°C] at an array of stamps [ns], for models that depend on it.
+    sampling_rate_hz : float, optional
+        Of arrays [Hz].
     **wishes
         ``sample_rate_hz``, ``bandwidth_hz``, ``max_delay_s``, ``lowest_hz`` as for `Corrector`.
 
@@ -90,7 +116,16 @@ def validate(reference, sensor, model, axis="x", temperature_at=None, **wishes):
     ------
     FracAccelError
         If the pair cannot be compared.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> model = frac_accel.SensorModel.load("bags/soft_mount.yaml")
+    >>> judged = frac_accel.validate("bags/soft_mount.mcap", model)
+    >>> judged.simulation.total.nrmse > 0.1  # the model in use lacks two effects
+    True
     """
+    reference, sensor = pair_of(source, sampling_rate_hz, axis)
     reference = restored(reference, sensor, model, axis, temperature_at)
     pair = Record.of(reference, sensor, axis)
     corrector = Corrector(model, **wishes)
@@ -102,9 +137,9 @@ def validate(reference, sensor, model, axis="x", temperature_at=None, **wishes):
                              f"warm up ({corrector.design.warm_up_samples})")
     comparison = compare(reference, sensor, Samples.of(stamps, values), corrector.design, axis)
     bands = [band.band_hz for band in comparison.corrected.bands]
+    measured, simulated = _simulated(model, pair, AXES.index(axis), temperature_at)
     return Validation(
-        simulation=error_metrics(*_simulated(model, pair, AXES.index(axis), temperature_at),
-                                 pair.sampling_rate_hz, bands),
+        simulation=error_metrics(measured, simulated, pair.sampling_rate_hz, bands),
         comparison=comparison, filters=corrector.design.summary(), counters=corrector.counters)
 
 

@@ -16,7 +16,7 @@ def figures(name, structure="oscillator"):
     bag = FOLDER / f"{name}.mcap"
     topics = read_bag(bag, [REFERENCE_TOPIC, RAW_TOPIC])
     result = identify(bag, structure=structure)
-    return result, validate(topics[REFERENCE_TOPIC], topics[RAW_TOPIC], result.model)
+    return result, validate((topics[REFERENCE_TOPIC], topics[RAW_TOPIC]), result.model)
 
 
 def table():

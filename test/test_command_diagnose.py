@@ -21,7 +21,8 @@ KEYS = {"verdict": str, "baseline": dict, "findings": list, "extended": dict,
         "unexplained_fraction": float}
 # What the result file has beyond the fixed form.
 FURTHER = {"reason": str, "suspects": list, "integrity": list, "established_noise": dict,
-           "budget": list}
+           "budget": list, "data": dict, "sensor_model": dict, "evidence": dict,
+           "provenance": dict}
 FINDING = {"cause", "parameters", "confidence", "confusable_with", "evidence", "explanation",
            "gain"}
 GAIN = {"held_out_rmse_before", "held_out_rmse_after", "reduction", "ci95"}

@@ -2,6 +2,7 @@
 
 import pytest
 from rig.hidden import draw_case
+from searched import searched
 
 import frac_accel
 
@@ -31,10 +32,9 @@ def test_is_named_now(seed, causes):
 
 def test_what_is_only_suspected_has_no_part_in_the_named_causes_parameters():
     case = draw_case(820057, ["cross_axis_sensitivity", "gain_drift", "quantization"])
-    reference, sensor, celsius = case.samples()
-    found = frac_accel.diagnose((reference, sensor), model=case.model(), temperature=celsius)
+    found, engine, _ = searched(case)
     assert found.suspects  # of a dead zone, which rounding resembles
     named = {finding.cause: finding.effect for finding in found.findings}
-    alone = found.engine.search.fits[frozenset(named) - {"quantization"}].effects
+    alone = engine.search.fits[frozenset(named) - {"quantization"}].effects
     assert {cause: named[cause] for cause in alone} == alone
     assert {effect.cause: effect for effect in found.model.axis("x").effects} == named

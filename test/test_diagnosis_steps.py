@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rig.hidden import draw_case
 from scipy.optimize import minimize
+from searched import searched
 
 import frac_accel
 from frac_accel.diagnosis.engine import Engine
@@ -47,9 +48,8 @@ def test_a_parameter_that_changes_nothing_stays():
 @pytest.mark.parametrize("cause", ["coulomb_friction", "hysteresis", "cubic_stiffness"])
 def test_derivatives_beside_a_force_are_those_of_a_finer_simulation(cause):
     case = draw_case(31, [cause, "core_parameter_shift", "low_pass_lag"], excitation="band_noise")
-    reference, sensor, celsius = case.samples()
-    found = frac_accel.diagnose((reference, sensor), model=case.model(), temperature=celsius)
-    problem = found.engine.problem
+    _, engine, _ = searched(case)
+    problem = engine.problem
     effects = {name: known_effects()[name](**values)
                for name, values in case.truth.items()}
     fit = problem.fit(effects, iterations=0)
@@ -106,12 +106,10 @@ def test_motion_from_before_the_record_goes_on_into_held_out_samples(seed):
     """A slow high-pass still falls off from where it was when the record began."""
     case = draw_case(seed, ["ac_coupling"], times_noise=np.exp(
         np.random.default_rng(seed).uniform(np.log(2), np.log(50))))
-    reference, sensor, celsius = case.samples()
-    found = frac_accel.diagnose((reference, sensor), model=case.model(), temperature=celsius)
+    found, engine, best = searched(case)
     assert [finding.cause for finding in found.findings] == ["ac_coupling"]
-    engine, rows = found.engine, found.engine.held_out_rows
-    error = (engine.problem.measured - engine.learnt(found.best).output)[rows]
+    error = (engine.problem.measured - engine.learnt(best).output)[engine.held_out_rows]
     assert np.sqrt(np.mean(error**2)) < 1.05 * case.noise_std
     # not backwards, where it would have been the larger, the earlier
     before = slice(int(np.argmax(engine.problem.used)))
-    assert np.array_equal(found.best.output[before], found.best.simulated[before])
+    assert np.array_equal(best.output[before], best.simulated[before])

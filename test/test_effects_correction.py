@@ -194,7 +194,7 @@ def test_what_cannot_be_done_live_is_refused():
         LiveSimulator(sensor_of([cubic]), RATE)
     with pytest.raises(DesignError, match="nonlinear terms need a delay"):
         Corrector(sensor_of([cubic]), RATE, max_delay_s=0.009)
-    with pytest.raises(DesignError, match="clock_skew differs"):
+    with pytest.raises(DesignError, match="clock's rate differs"):
         Corrector(SensorModel.from_dict({
             "schema": "frac_accel/sensor_model/1",
             "core": {"natural_frequency_hz": 150.0, "damping_ratio": 0.3},

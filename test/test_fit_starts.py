@@ -2,17 +2,16 @@
 
 import pytest
 from rig.hidden import draw_case
+from searched import searched
 
-from frac_accel import diagnose
 from frac_accel.effects import known_effects
 
 
 @pytest.fixture(scope="module")
 def view():
     case = draw_case(7, ["temperature_sensitivity"])
-    reference, sensor, temperature = case.samples()
-    found = diagnose((reference, sensor), case.model(), temperature=temperature)
-    return found.engine.search.view(found.engine.search.fit(found.engine.search.base))
+    _, engine, _ = searched(case)
+    return engine.search.view(engine.search.fit(engine.search.base))
 
 
 @pytest.mark.parametrize(

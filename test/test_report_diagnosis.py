@@ -4,6 +4,8 @@ import dataclasses
 import html
 import json
 import re
+import shutil
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,8 @@ from test_report_identification import traces, values
 from frac_accel import read_bag
 from frac_accel.bag import RAW_TOPIC
 from frac_accel.cli import main
-from frac_accel.diagnosis import diagnose
+from frac_accel.commands._common import write_json
+from frac_accel.diagnosis import Diagnosis, diagnose
 from frac_accel.diagnosis.experiments import separating_experiment
 from frac_accel.effects import known_effects
 from frac_accel.report.diagnosis import diagnosis_page
@@ -32,12 +35,26 @@ def words(page):
     return re.sub(r"\s+", " ", html.unescape(re.sub(r"<[^>]+>", " ", page)))
 
 
+def again(found):
+    """The same diagnosis, written to a result file and read."""
+    folder = tempfile.mkdtemp()
+    path = Path(folder) / "r.json"
+    write_json(path, found.as_dict())
+    read = Diagnosis.from_dict(json.loads(path.read_text()))
+    shutil.rmtree(folder)
+    return read
+
+
 @pytest.fixture(scope="module")
 def explained(tmp_path_factory):
     """Page and result file of the bag with two hidden effects."""
     folder = tmp_path_factory.mktemp("explained")
     assert main(["diagnose", str(BAG), "--model", str(MODEL), "--report", str(folder / "r.html"),
                  "--json", str(folder / "r.json")]) == 0
+    # the page again from the result file, without the bag
+    assert main(["report", str(folder / "r.json"), "-o", str(folder / "again.html")]) == 0
+    assert (folder / "again.html").read_bytes() == (folder / "r.html").read_bytes()
+    assert (folder / "r.json").stat().st_size < 300_000
     return (folder / "r.html").read_text(), json.loads((folder / "r.json").read_text())
 
 
@@ -99,7 +116,9 @@ def test_page_of_other_verdicts(verdict, seed, causes, present, absent):
     if verdict == "partly_explained":
         found = doubtful(found)
     assert found.verdict == verdict
-    page = diagnosis_page(found, {"bag": "case"}).html()
+    source = {"bag": "case", "date": "2020-02-02"}
+    page = diagnosis_page(found, source).html()
+    assert diagnosis_page(again(found), source).html() == page
     text = words(page)
     for part in present:
         assert part in text, part
@@ -123,7 +142,10 @@ def test_page_of_too_little_data():
                               variance=samples.variance[:400]) for samples in (reference, sensor)]
     found = diagnose(tuple(short), None)
     assert found.verdict == "insufficient_data"
-    text = words(diagnosis_page(found).html())
+    source = {"date": "2020-02-02"}
+    page = diagnosis_page(found, source).html()
+    assert diagnosis_page(again(found), source).html() == page
+    text = words(page)
     assert "Insufficient data" in text and "400 samples" in text and "Nothing was fitted" in text
     assert not re.search(r"\b(nan|None)\b", text)
 
@@ -132,7 +154,10 @@ def test_page_of_a_model_that_was_identified_first():
     case = draw_case(24)
     reference, sensor, temperature = case.samples()
     found = diagnose((reference, sensor), None, "x", temperature)
-    text = words(diagnosis_page(found).html())
+    source = {"date": "2020-02-02"}
+    page = diagnosis_page(found, source).html()
+    assert diagnosis_page(again(found), source).html() == page
+    text = words(page)
     assert "In every set: core_parameter_shift" in text
 
 
@@ -144,3 +169,25 @@ def test_every_cause_names_an_experiment(cause):
     other = "offset" if cause != "offset" else "time_delay"
     both = separating_experiment([other, cause])
     assert f"For {cause}: {sentence}" in both and f"For {other}: " in both
+
+
+@pytest.mark.parametrize("content, words", [
+    ("", "not valid JSON"), ("[1", "not valid JSON"), ("[]", "no result of a diagnosis"),
+    ('{"verdict": "explained"}', "no result of a diagnosis"),
+    ('{"verdict": "explained", "evidence": {"axis": "x"}, "data": {}}', "no complete result"),
+])
+def test_what_is_no_result_is_refused_in_one_line(tmp_path, capsys, content, words):
+    path = tmp_path / "r.json"
+    path.write_text(content)
+    assert main(["report", str(path), "-o", str(tmp_path / "r.html")]) == 2
+    line, = capsys.readouterr().err.strip().splitlines()
+    assert str(path) in line and words in line
+    assert not (tmp_path / "r.html").exists()
+
+
+def test_a_result_with_a_cause_that_is_not_installed_names_it(explained, tmp_path, capsys):
+    path = tmp_path / "r.json"
+    text = json.dumps(explained[1]).replace("cubic_stiffness", "stiffness_of_another")
+    path.write_text(text)
+    assert main(["report", str(path), "-o", str(tmp_path / "r.html")]) == 2
+    assert "stiffness_of_another" in capsys.readouterr().err

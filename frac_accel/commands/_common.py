@@ -4,6 +4,7 @@ import argparse
 import hashlib
 import json
 import math
+import re
 import sys
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from ..errors import BagError, FracAccelError
 from ..parameters import plain
 from ..record import Temperature
 from ..report import require_plotly
+
+_NUMBERS = re.compile(r"\[([-+.\deEnul,\s]*)\]")
 
 
 def add_bag(parser):
@@ -41,8 +44,8 @@ def add_topics(parser, axis=True):
 def add_temperature(parser):
     """Which topic holds the temperature."""
     parser.add_argument("--temperature", default=TEMPERATURE_TOPIC, metavar="TOPIC",
-                        help="topic of the sensor's temperature, which a model with "
-                             "temperature_sensitivity needs (default: %(default)s)")
+                        help="topic of the sensor's temperature, for models that depend on it "
+                             "(default: %(default)s)")
 
 
 def read_temperature_at(reader, topic):
@@ -111,6 +114,8 @@ def write_json(path, result):
     if path is None:
         return
     text = json.dumps(_without_nan(plain(result)), indent=1, allow_nan=False)
+    # a list of numbers is one line, not one for each
+    text = _NUMBERS.sub(lambda found: f"[{' '.join(found[1].split())}]", text)
     try:
         Path(path).write_text(text + "\n", encoding="utf-8")
     except OSError as error:

@@ -63,15 +63,18 @@ def run(arguments):
     print(table(found, arguments.axis))
     command = f"frac_accel diagnose {arguments.bag} --axis {arguments.axis}" + (
         f" --model {arguments.model}" if arguments.model else "")
+    source = provenance(arguments.bag, command)
     if arguments.extended_model and found.model is not None:
-        found.model.metadata["provenance"] = provenance(arguments.bag, command)
+        found.model.metadata["provenance"] = source
         found.model.save(arguments.extended_model)
         print(f"{arguments.extended_model}: written")
     if arguments.report:
         from ..report.diagnosis import diagnosis_page
-        diagnosis_page(found, provenance(arguments.bag, command)).write(arguments.report)
+        page = diagnosis_page(found, source)
+        page.write(arguments.report)
+        source = page.provenance
         print(f"{arguments.report}: written")
-    write_json(arguments.json, found.as_dict(arguments.extended_model))
+    write_json(arguments.json, {**found.as_dict(arguments.extended_model), "provenance": source})
 
 
 def table(found, axis):
@@ -80,7 +83,7 @@ def table(found, axis):
     lines += [f"data: {words}" for words in found.integrity.words]
     if found.verdict == "insufficient_data":
         return "\n".join(lines)
-    if found.engine.problem.record.temperature_c is None:
+    if not found.evidence.has_temperature:
         lines.append("data: no temperature was recorded: what depends on it cannot be found")
     lines.append(f"the model in use leaves {found.baseline['rmse']:.4g} "
                  f"({found.baseline['nrmse']:.3%} of the output) on held-out data; noise "

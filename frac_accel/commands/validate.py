@@ -39,7 +39,7 @@ def run(arguments):
         temperature = read_temperature_at(reader, arguments.temperature)
     topics = read_bag(arguments.bag, [arguments.reference, arguments.sensor])
     try:
-        result = validate(topics[arguments.reference], topics[arguments.sensor], model,
+        result = validate((topics[arguments.reference], topics[arguments.sensor]), model,
                           arguments.axis, temperature_at=temperature, **filter_wishes(arguments))
     except FracAccelError as error:
         raise type(error)(f"{arguments.bag}: {error}") from None

@@ -259,8 +259,8 @@ def _clock_ratio(model):
         raise DesignError("effects: time_step differs between the axes, but a sample has one stamp "
                           "for all of them")
     if len(ratios) > 1:
-        raise DesignError("effects: clock_skew differs between the axes, but a sample has one "
-                          "stamp for all of them")
+        raise DesignError("effects: the clock's rate differs between the axes, but a sample has "
+                          "one stamp for all of them")
     return ratios.pop()
 
 

@@ -2,12 +2,13 @@
 
 import dataclasses
 import functools
-from pathlib import Path
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import binary_erosion
 
-from ..bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
+from ..bag import RAW_TOPIC, REFERENCE_TOPIC
 from ..core import Gain, Oscillator
 from ..effects import known_effects
 from ..errors import FracAccelError, IdentificationError
@@ -17,6 +18,7 @@ from ..model import AXES, SensorModel
 from ..record import Record
 from ..record.orientation import Orientation, turned_away
 from ..simulation import AxisSimulator
+from ..sources import pair_of
 from .engine import Engine
 from .judgement import Diagnosis, Finding, insufficient, judge
 from .leftover import related
@@ -38,14 +40,17 @@ _EXCHANGED = 0.3
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
 
-def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE_TOPIC,
-             sensor=RAW_TOPIC, progress=None, noise_std=None, time_limit_s=float("inf")):
+def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
+             temperature: tuple | None = None, reference: str = REFERENCE_TOPIC,
+             sensor: str = RAW_TOPIC, progress: Callable | None = None,
+             noise_std: float | None = None, time_limit_s: float = float("inf"),
+             sampling_rate_hz: float | None = None) -> Diagnosis:
     """Find what a simulation gets wrong, and why.
 
     Parameters
     ----------
-    source : str, Path or tuple of Samples
-        A bag, or the samples of reference and sensor.
+    source : str, Path or tuple
+        A bag, or (reference, sensor) as `Samples` or as arrays of shape (n,) or (n, 3).
     model : SensorModel, optional
         The model in use; without it a classical one is identified first.
     axis : {"x", "y", "z"}
@@ -59,6 +64,8 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
         Standard deviation of the sensor's noise [output units], where it is known.
     time_limit_s : float
         Budget of processor time [s]; what it leaves out is said in `Diagnosis.cut_off`.
+    sampling_rate_hz : float, optional
+        Of arrays [Hz].
 
     Returns
     -------
@@ -68,15 +75,22 @@ def diagnose(source, model=None, axis="x", temperature=None, reference=REFERENCE
     ------
     FracAccelError
         If the record cannot be used, the sensor does not follow the reference, or no classical
-        model can be identified although the excitation would do.
+        model can be identified although the excitation would do; if arrays are no pair: wrong
+        shapes, values that are not finite, or no rate.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> found = frac_accel.diagnose("bags/soft_mount.mcap",
+    ...                             frac_accel.SensorModel.load("bags/soft_mount.yaml"))
+    >>> [finding.cause for finding in found.findings]
+    ['time_delay', 'cubic_stiffness']
     """
     if noise_std is not None and not (np.isfinite(noise_std) and noise_std > 0):
         raise FracAccelError(f"noise_std: {noise_std} given, expected a number above 0")
     progress = progress or (lambda words: None)
     limit = TimeLimit(time_limit_s)
-    if isinstance(source, (str, Path)):
-        topics = read_bag(source, [reference, sensor])
-        source = topics[reference], topics[sensor]
+    source = pair_of(source, sampling_rate_hz, axis, reference, sensor)
     column = AXES.index(axis)
     progress("checking the data")
     record = Record.of(*source, axis, temperature)

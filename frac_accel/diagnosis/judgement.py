@@ -11,6 +11,8 @@ from ..budget import WORDS
 from ..effects import known_effects
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..parameters import fixed_values, parameter_fields
+from ..shown import Shown
+from .evidence import Evidence
 from .experiments import separating_experiment
 from .gain import gain
 from .names import cancelling, undetermined
@@ -86,7 +88,7 @@ class Finding:
 
 
 @dataclasses.dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Shown):
     """What was found about one axis.
 
     Attributes
@@ -112,6 +114,8 @@ class Diagnosis:
         What a time limit left out.
     budget : list of dict
         ``part``, ``of`` (baseline or extended), ``share`` of what is left, and its ``ci95``.
+    evidence : Evidence or None
+        What it rests on, for its page; None where nothing was fitted.
     """
 
     verdict: str
@@ -123,12 +127,19 @@ class Diagnosis:
     unexplained_fraction: float
     model: object
     integrity: object
-    engine: object = None
-    best: object = None
+    evidence: Evidence | None = None
     established_noise: dict = dataclasses.field(
         default_factory=lambda: {"rms": None, "by": None})
     cut_off: str | None = None
     budget: list = dataclasses.field(default_factory=list)
+
+    def __repr__(self):
+        causes = ", ".join(finding.cause for finding in self.findings)
+        return f"<Diagnosis: {self.verdict}{': ' if causes else ''}{causes}; {self.reason}>"
+
+    def _draw(self, figure):
+        if self.evidence is not None:
+            self.evidence.draw(figure)
 
     def as_dict(self, model_file=None):
         """As the result file has it."""
@@ -139,7 +150,23 @@ class Diagnosis:
                 "suspects": self.suspects,
                 "extended": {**self.extended, "model": model_file},
                 "unexplained_fraction": self.unexplained_fraction,
-                "integrity": self.integrity.words}
+                "integrity": self.integrity.words,
+                "data": {key: value for key, value in dataclasses.asdict(self.integrity).items()
+                         if key != "words"},
+                "sensor_model": self.model.to_dict() if self.model is not None else None,
+                "evidence": self.evidence.as_dict() if self.evidence is not None else None}
+
+    @classmethod
+    def from_dict(cls, data):
+        """Inverse of `as_dict`.
+
+        Raises
+        ------
+        FracAccelError
+            If it is no result of a diagnosis, or names a cause that is not installed.
+        """
+        from .result import diagnosis_from
+        return diagnosis_from(data)
 
 
 def insufficient(reason, model, found):
@@ -293,6 +320,17 @@ def _accounted(rmse, problem, noise):
     return rmse <= _LITTLE * spread or (noise.rms is not None and rmse <= _AS_NOISE * noise.rms)
 
 
+def _mirrored(engine, best):
+    """The same set with causes that say the same with the other sign, where these were as good."""
+    for fit in engine.search.fits.values():
+        turned = [effect.mirrors for cause, effect in fit.effects.items()
+                  if cause not in best.effects]
+        if turned and set(turned) == best.causes - fit.causes - set(engine.search.base) \
+                and fit.cost - best.cost < _CLEAR * best.cost / engine.problem.count:
+            return fit
+    return best
+
+
 def _suspect(causes, margin, reason):
     return {"causes": sorted(causes), "margin": float(margin), "reason": reason,
             "experiment": separating_experiment(causes)}
@@ -344,7 +382,8 @@ def _verdict(engine, best, left, findings, suspects, found, noise):
         {"rmse": before, "nrmse": before / spread, "noise_rms": noise_rms},
         findings, suspects,
         {"rmse": after, "nrmse": after / spread},
-        float(min(fraction, 1.0)), model, found, engine, best,
+        float(min(fraction, 1.0)), model, found,
+        Evidence.of(engine, best, {f.cause: f.effect for f in findings}),
         noise.as_dict(), p.limit.summary(),
         [entry for of, parted in (("baseline", engine.budget(baseline)), ("extended", budget))
          if parted is not None for entry in parted.as_list(of)])

@@ -1,11 +1,14 @@
 """From measured pairs to a sensor model with standard uncertainties."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import FracAccelError, IdentificationError
-from ..record import Record
+from ..record import Record, Samples
+from ..sources import is_bag, pair_of
 from .candidate import STRUCTURES as _STRUCTURES
 from .candidate import Candidate, Data
 from .choice import choose, choose_classical, choose_of_several
@@ -23,14 +26,18 @@ STRUCTURES = ("auto", "classical", *_STRUCTURES)
 _FREED = 2 << 20
 
 
-def identify(pair, axis="x", structure="auto", provenance=None, progress=None, records=None):
+def identify(pair: Any, axis: str = "x", structure: str = "auto",
+             provenance: dict | None = None, progress: Callable | None = None,
+             records: list | None = None, sampling_rate_hz: float | None = None
+             ) -> Identification:
     """Identify a sensor model.
 
     Parameters
     ----------
-    pair : Record, str or Path, or a list of them
-        A measured pair, or a bag with one on the default topics. Of several, each gets a model
-        that is judged on all others, and the result is their mean.
+    pair : Record, str, Path or tuple, or a list of them
+        A measured pair, a bag with one on the default topics, or (reference, sensor) as `Samples`
+        or as arrays of shape (n,) or (n, 3). Of several, each gets a model that is judged on all
+        others, and the result is their mean.
     axis : {"x", "y", "z"}
     structure : {"auto", "arx", "oscillator", "fractional", "fractional_transfer_function", \
             "gain", "classical"}
@@ -49,6 +56,8 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None, r
         Called with a few words before each step that may take seconds.
     records : list of str, optional
         Names of several pairs, for messages.
+    sampling_rate_hz : float, optional
+        Of arrays [Hz].
 
     Returns
     -------
@@ -58,19 +67,33 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None, r
     ------
     IdentificationError
         If the data cannot identify the model; says what is missing.
+    FracAccelError
+        If arrays are no pair: wrong shapes, values that are not finite, or no rate.
+
+    Examples
+    --------
+    >>> import numpy as np, frac_accel
+    >>> from frac_accel.core import Oscillator
+    >>> rng = np.random.default_rng(1)
+    >>> motion = np.convolve(rng.normal(size=8000), np.hanning(5), "same")
+    >>> output = frac_accel.simulate(frac_accel.SensorModel(Oscillator(90.0, 0.2)), motion,
+    ...                              1000.0, "x") + 1e-3 * rng.normal(size=8000)
+    >>> found = frac_accel.identify((motion, output), structure="oscillator",
+    ...                             sampling_rate_hz=1000.0)
+    >>> round(found.parameters["natural_frequency_hz"]["value"], 1)
+    90.0
     """
     if structure not in STRUCTURES:
         raise FracAccelError(f"structure: {structure!r} given, expected one of "
                              f"{', '.join(STRUCTURES)}")
     np.empty(_FREED)
-    pairs = pair if isinstance(pair, (list, tuple)) else [pair]
+    pairs = [pair] if isinstance(pair, Record) or is_bag(pair) or _is_pair(pair) else list(pair)
     if not pairs:
         raise IdentificationError("no record given, expected at least one")
     records = records or [Path(pair).name if isinstance(pair, (str, Path)) else f"record {i + 1}"
                           for i, pair in enumerate(pairs)]
     progress = progress or (lambda words: None)
-    datas = [Data.of(Record.load(pair, axis=axis) if isinstance(pair, (str, Path)) else pair, axis,
-                     progress) for pair in pairs]
+    datas = [Data.of(_pair(pair, axis, sampling_rate_hz), axis, progress) for pair in pairs]
     agreeing = None
     if len(datas) > 1:
         structure = {"classical": "oscillator"}.get(structure, structure)
@@ -82,3 +105,18 @@ def identify(pair, axis="x", structure="auto", provenance=None, progress=None, r
     else:
         chosen, reason = Candidate.of(structure, datas[0]), "asked for"
     return identification(chosen, reason, datas, records, axis, provenance or {}, agreeing)
+
+
+def _is_pair(source):
+    """Whether this is (reference, sensor), and not several pairs."""
+    return isinstance(source, (tuple, list)) and len(source) == 2 and all(
+        isinstance(part, Samples) or not (isinstance(part, (Record, tuple)) or is_bag(part))
+        for part in source)
+
+
+def _pair(source, axis, sampling_rate_hz):
+    if isinstance(source, Record):
+        return source
+    if is_bag(source):
+        return Record.load(source, axis=axis)
+    return Record.of(*pair_of(source, sampling_rate_hz, axis), axis)

@@ -8,6 +8,7 @@ from ..core import Oscillator
 from ..effects import IDENTIFIED, identified_effect
 from ..model import SensorModel
 from ..parameters import parameter_fields, unit_of
+from ..shown import Shown
 from .arx import ArxFit
 from .candidate import needed_order, suspicions
 from .excitation import Excitation
@@ -20,7 +21,7 @@ _SIGNIFICANT = 3.0
 
 
 @dataclasses.dataclass(frozen=True)
-class Identification:
+class Identification(Shown):
     """An identified model and what the data say about it.
 
     What belongs to one record is, of several records, that of the first.
@@ -66,6 +67,27 @@ class Identification:
     excitation: Excitation
     points: ResponsePoints | None
     frequency_domain: dict | None
+
+    def __repr__(self):
+        values = ", ".join(f"{name} {entry['value']:.5g} ± {entry['std']:.2g}"
+                           for name, entry in list(self.parameters.items())[:4])
+        return f"<Identification: {self.structure}: {values}; residual {self.nrmse:.2%}>"
+
+    def _draw(self, figure):
+        band = self.model.band_hz or (1.0, 1000.0)
+        frequency = np.geomspace(max(band[0], 1e-3 * band[1]), band[1], 400)
+        axis = self.points.axis if hasattr(self.points, "axis") else "x"
+        response = self.model.frequency_response(frequency, axis)
+        upper, lower = figure.subplots(2, sharex=True)
+        upper.loglog(frequency, np.abs(response), label="model")
+        lower.semilogx(frequency, np.degrees(np.unwrap(np.angle(response))))
+        if self.points is not None:
+            measured = self.points.response
+            upper.loglog(self.points.frequency_hz, np.abs(measured), ".", label="measured")
+            lower.semilogx(self.points.frequency_hz, np.degrees(np.angle(measured)), ".")
+        upper.legend()
+        upper.set_ylabel("amplitude [output units per m/s²]")
+        lower.set(xlabel="frequency [Hz]", ylabel="phase [°]")
 
     def as_dict(self):
         """Plain numbers, lists and the model's content."""

@@ -1,10 +1,7 @@
 """The page of a diagnosis: the verdict, its evidence, what was considered and what is left."""
 
-import numpy as np
-
-from ..model import AXES
 from ..parameters import parameter_fields
-from .diagnosis_figures import Compared, discrepancy
+from .diagnosis_figures import discrepancy
 from .figures import COVERAGE_FACTOR
 from .page import Page
 from .quantity import percent, rounded
@@ -29,29 +26,28 @@ def diagnosis_page(found, provenance=None):
     -------
     Page
     """
-    problem = None if found.engine is None else found.engine.problem
-    axis = f", axis {AXES[problem.axis]}" if problem else ""
+    seen = found.evidence
+    axis = f", axis {seen.axis}" if seen else ""
     page = Page(f"Diagnosis{axis}: {_VERDICTS[found.verdict].lower()}", provenance)
     _verdict(page.section("Verdict"), found)
-    if problem is None:
+    if seen is None:
         _data(page.section("Data"), found)
         return page
-    compared = Compared.of(found)
-    discrepancy(page.section("What the simulation gets wrong"), compared, found)
+    discrepancy(page.section("What the simulation gets wrong"), found)
     if found.findings:
         _causes(page.section("Causes"), found)
     if found.suspects:
         _suspects(page.section("Not told apart"), found)
     rivals(page.section("What else was considered"), found)
-    _model(page.section("Extended model" if found.findings else "Model in use"), found, problem)
-    _left(page.section("What is left"), found, compared)
-    _data(page.section("Data"), found, problem)
+    _model(page.section("Extended model" if found.findings else "Model in use"), found)
+    _left(page.section("What is left"), found)
+    _data(page.section("Data"), found)
     return page
 
 
 def _verdict(section, found):
     section.notice(f"{_VERDICTS[found.verdict]}: {found.reason}.")
-    if found.engine is None:
+    if found.evidence is None:
         section.text("Nothing was fitted, and nothing is said about the sensor. Record what is "
                      "missing, and diagnose again.")
         return
@@ -137,9 +133,9 @@ def _suspects(section, found):
                   "nearest rival; 0 where too much is left for any margin to count.")
 
 
-def _model(section, found, problem):
-    axis = AXES[problem.axis]
-    before, after = problem.baseline.axis(axis), found.model.axis(axis)
+def _model(section, found):
+    axis = found.evidence.axis
+    before, after = found.evidence.in_use.axis(axis), found.model.axis(axis)
     own = {(f.cause, name): std for f in found.findings for name, std in f.std.items()}
     old = {effect.cause: effect for effect in before.effects}
     rows = _parameters(after.core.type, after.core, before.core, {})
@@ -169,10 +165,10 @@ def _parameters(part, entity, old, stds):
     return rows
 
 
-def _left(section, found, compared):
+def _left(section, found):
     section.text(_unexplained(found) if found.findings or found.verdict == "consistent" else
                  "All of the error above the noise stays unexplained.")
-    left = found.engine.left(compared.fitted)
+    left = found.evidence.left
     for share, score, words in (
             (left.linear, left.linear_score, "still follows the motion as a linear system would"),
             (left.level, left.level_score, "comes and goes with the size of the motion")):
@@ -182,26 +178,25 @@ def _left(section, found, compared):
         section.text("Noise does neither. Six standard deviations count as significant.")
 
 
-def _data(section, found, problem=None):
-    seen = found.integrity
-    section.items(map(sentence, seen.words))
-    if not seen.words:
+def _data(section, found):
+    seen, data = found.evidence, found.integrity
+    section.items(map(sentence, data.words))
+    if not data.words:
         section.text("Stamps and values show nothing unusual: no samples are missing, repeated or "
                      "not finite, no limit is reached.")
-    if problem is None:
-        section.text(f"{seen.samples} samples of the sensor.")
+    if seen is None:
+        section.text(f"{data.samples} samples of the sensor.")
         return
-    record, rows = problem.record, found.engine.held_out_rows
-    parts = int(np.sum(np.diff(rows.astype(int)) > 0))
-    section.text(f"{len(record)} samples at {record.sampling_rate_hz:.6g} Hz "
-                 f"({len(record) / record.sampling_rate_hz:.4g} s), of which "
-                 f"{int(record.valid.sum())} in both topics and {problem.count} used. Held-out "
-                 f"errors are of {rows.mean():.0%} of the record, "
-                 + ("its last part, by fits to what comes before." if parts <= 1 else
-                    f"{parts} stretches of it, by fits to the stretches between."))
-    sought = "was recorded and is accounted for" if record.temperature_c is not None else \
+    section.text(f"{seen.samples} samples at {seen.sampling_rate_hz:.6g} Hz "
+                 f"({seen.samples / seen.sampling_rate_hz:.4g} s), of which {seen.valid} in both "
+                 f"topics and {seen.used} used. Held-out errors are of {seen.held_out_share:.0%} "
+                 "of the record, "
+                 + ("its last part, by fits to what comes before." if seen.held_out_stretches <= 1
+                    else f"{seen.held_out_stretches} stretches of it, by fits to the stretches "
+                    "between."))
+    sought = "was recorded and is accounted for" if seen.has_temperature else \
         "was not recorded: what depends on it cannot be found"
     section.text(f"The temperature {sought}.")
-    if not np.ptp(np.delete(record.reference, problem.axis, axis=1), axis=0).any():
+    if not seen.moves_across:
         section.text("The reference shows no motion across the axis: cross-axis sensitivity "
                      "cannot be found.")

@@ -8,6 +8,7 @@ import dataclasses
 
 import numpy as np
 
+from ..thinning import envelope
 from .page import require_plotly
 
 MEASURED = "#8a919a"
@@ -15,8 +16,6 @@ MODEL = "#2f86c9"
 RESIDUAL = "#d9772b"
 SERIES = (MODEL, RESIDUAL, "#3d9c63", "#9467bd", MEASURED, "#c2498a")
 
-# Points of a signal after `envelope`: more than a screen has columns, twice.
-MOST_POINTS = 4000
 _FONT = "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif"
 # Half-width of a 95 % interval in standard uncertainties, as calibration certificates have it.
 COVERAGE_FACTOR = 2.0
@@ -192,16 +191,18 @@ def time_signals(time_s, signals, residual=None, unit="output units"):
     Parameters
     ----------
     time_s : ndarray, shape (n,)
-    signals : dict of str to ndarray, shape (n,)
-        NaN leaves a gap.
+    signals : dict of str to ndarray, shape (n,), or to a pair of them
+        NaN leaves a gap. A pair is times and values of a signal that was thinned before.
     residual : ndarray, shape (n,), or dict of str to ndarray, optional
-        A dict where several signals have one each, by their names.
+        A dict where several signals have one each, by their names, arrays or pairs as well.
     unit : str
 
     Returns
     -------
     plotly.graph_objects.Figure
     """
+    def thin(values):
+        return values if isinstance(values, tuple) else envelope(time_s, values)
     rows = 1 if residual is None else 2
     labels = [f"output<br>[{unit}]", f"residual<br>[{unit}]"][:rows]
     figure = _rows(rows, 280 + 200 * (rows - 1), "time [s]", labels,
@@ -209,14 +210,14 @@ def time_signals(time_s, signals, residual=None, unit="output units"):
     colours = dict(zip(signals, (MEASURED, *SERIES)))
     for name, values in signals.items():
         # the measured signal shows on both sides of the model that is drawn upon it
-        _line(figure, *envelope(time_s, values), 1, name, colours[name],
+        _line(figure, *thin(values), 1, name, colours[name],
               width=3 if colours[name] is MEASURED else 1.2)
     if isinstance(residual, dict):
         for name, values in residual.items():
-            _line(figure, *envelope(time_s, values), 2, f"residual of the {name}", colours[name],
+            _line(figure, *thin(values), 2, f"residual of the {name}", colours[name],
                   legend=False)
     elif residual is not None:
-        _line(figure, *envelope(time_s, residual), 2, "residual", RESIDUAL)
+        _line(figure, *thin(residual), 2, "residual", RESIDUAL)
     return figure
 
 
@@ -331,37 +332,6 @@ def lines(x, series, x_label, y_label, band=None, points=None, log=""):
     if "y" in log:
         figure.update_yaxes(type="log")
     return figure
-
-
-def envelope(x, values, most=MOST_POINTS):
-    """Thin a long signal to the smallest and largest value of each of many short stretches.
-
-    Parameters
-    ----------
-    x, values : ndarray, shape (n,)
-    most : int
-        Largest number of points.
-
-    Returns
-    -------
-    x, values : ndarray, shape (m,)
-        Those points in their order; all of a signal of at most `most`. A stretch of NaN alone
-        leaves one.
-    """
-    n = len(values)
-    if n <= most:
-        return x, values
-    size = -(-2 * n // most)
-    starts = np.arange(0, n, size)
-    padded = np.full(len(starts) * size, np.nan)
-    padded[:n] = values
-    stretches = padded.reshape(-1, size)
-    missing = np.isnan(stretches)
-    ends = np.stack([np.argmin(np.where(missing, np.inf, stretches), axis=1),
-                     np.argmax(np.where(missing, -np.inf, stretches), axis=1)], axis=1)
-    # a stretch without spread, or without any value, is one point
-    chosen = np.unique(np.sort(ends, axis=1) + starts[:, None])
-    return np.asarray(x)[chosen], np.asarray(values)[chosen]
 
 
 def _rows(rows, height, x_label, y_labels, weights=None, x_type="linear"):

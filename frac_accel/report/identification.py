@@ -6,11 +6,12 @@ from scipy.signal import coherence, welch
 from ..errors import ModelError
 from ..identification.excitation import strongest_stretch
 from ..model import AXES
+from ..thinning import close_up, segment
 from ..uncertainty import response_uncertainty
 from . import figures
 from .page import Page
 from .quantity import percent, rounded
-from .signals import close_up, segment, sentence, thinned
+from .signals import sentence, thinned
 
 # Frequencies of the drawn response.
 _FREQUENCIES = 400

@@ -1,50 +1,33 @@
 """Which other sets of causes were fitted, and why they lost."""
 
-import numpy as np
-
-from ..diagnosis.engine import noise_peak
-
-# Sets of causes in the table.
-_MOST = 14
-# Costs over the best one's up to which a set describes the record as well.
-_AS_WELL = 1.02
+# Errors over the chosen set's up to which a set describes the record as well.
+_AS_WELL = 1.01
 
 
 def rivals(section, found):
     """Fill a section with the sets of causes that were fitted, the best ones first."""
-    engine, best = found.engine, found.best
-    base = set(engine.search.base)
-    samples = engine.problem.count
-    variance = best.cost / samples * noise_peak(best.residual, engine.problem.used)
-    own = engine.score(best, variance)
-    fits = sorted((fit for fit in engine.search.fits.values() if fit.causes != best.causes),
-                  key=lambda fit: fit.cost)
-    bare = engine.search.fit(engine.search.base)
-    shown = [best, *[fit for fit in fits if fit is not bare][:_MOST]]
-    if bare is not best:
-        shown.append(bare)
+    seen = found.evidence
     chosen = "fits best, but is not sure: see above" if found.suspects else "chosen"
-    rows = [[" + ".join(sorted(fit.causes - base)) or "(the model in use)",
-             str(len(fit.unknowns)), f"{np.sqrt(fit.cost / samples):.4g}",
-             "–" if fit is best else f"{engine.score(fit, variance) - own:.3g}",
-             chosen if fit is best else _why(fit, best)] for fit in shown]
+    best = next(rival for rival in seen.rivals if rival.chosen)
+    rows = [[" + ".join(rival.causes) or "(the model in use)", str(rival.parameters),
+             f"{rival.rmse:.4g}", "–" if rival.chosen else f"{rival.behind:.3g}",
+             chosen if rival.chosen else _why(rival, best)] for rival in seen.rivals]
     section.table(
-        ["causes", "parameters", "RMSE", "behind by", "why not"], rows,
-        f"The sets of causes that describe the whole record best, of "
-        f"{len(engine.search.fits)} that were fitted; those that fell far behind were not fitted "
-        "to the end. Behind by: in variances of the noise, with a penalty for each parameter; "
-        "less than 10 does not tell two sets apart."
-        + (f" In every set: {', '.join(sorted(base))}, within what the model in use leaves open."
-           if base else ""))
+        ["causes", "parameters", "RMSE", "fits worse by [σ²]", "why not"], rows,
+        f"The sets of causes that fit the whole record best, of {seen.fitted_sets} that were "
+        "fitted; sets that fell far behind were not fitted to the end. Fits worse by: in variances "
+        "σ² of the noise, with a penalty for each parameter; less than 10 does not tell two sets "
+        "apart."
+        + (f" In every set: {', '.join(seen.always)}, within what the model in use leaves open."
+           if seen.always else ""))
 
 
-def _why(fit, best):
+def _why(rival, best):
     """Why a set of causes was not chosen."""
-    ratio = np.sqrt(fit.cost / best.cost)
-    if fit.cost > _AS_WELL * best.cost:
-        return f"leaves {ratio:.3g} times the error"
-    if len(fit.unknowns) > len(best.unknowns):
-        return "its further parameters gain what chance would, or nothing on held-out data"
-    if len(fit.unknowns) < len(best.unknowns):
+    if rival.rmse > _AS_WELL * best.rmse:
+        return f"leaves {rival.rmse / best.rmse:.3g} times the error"
+    if rival.parameters > best.parameters:
+        return "its further parameters gain no more than chance, or nothing on held-out data"
+    if rival.parameters < best.parameters:
         return "leaves more than chance would"
-    return "describes the record nearly as well"
+    return "fits the record nearly as well"

@@ -91,10 +91,11 @@ def corrections(case, extended):
         stamps, celsius = temperature
         wish["temperature_at"] = lambda at: np.interp(at, stamps, celsius)
     try:
-        oracle = validate(reference, sensor, SensorModel.from_dict(case.sensor.to_model()), **wish)
+        pair = reference, sensor
+        oracle = validate(pair, SensorModel.from_dict(case.sensor.to_model()), **wish)
         wish["bandwidth_hz"] = oracle.filters["axes"]["x"]["band_hz"][1]
-        judged = {"oracle": oracle, "extended": validate(reference, sensor, extended, **wish),
-                  "in_use": validate(reference, sensor, case.model(), **wish)}
+        judged = {"oracle": oracle, "extended": validate(pair, extended, **wish),
+                  "in_use": validate(pair, case.model(), **wish)}
         return {name: v.comparison.corrected.total.nrmse for name, v in judged.items()}
     except Exception as error:  # as in `run`
         return f"{type(error).__name__}: {error}"

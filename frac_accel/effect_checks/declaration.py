@@ -1,0 +1,161 @@
+"""What a cause declares: parameters, sentences, documentation, starts; and its way through YAML."""
+
+import dataclasses
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from ..effects import effect_names, effect_of
+from ..effects.base import STAMPS, Effect
+from ..effects.fit_starts import Start
+from ..errors import FracAccelError
+from ..model import AXES, SensorModel
+from ..parameters import Scales, as_mapping, build, parameter_fields, plain
+from .draws import CORE, RATE, Broken, sensor_with, span, words
+
+_TABLE = Path(__file__).parents[2] / "docs" / "effects.md"
+_KINDS = ("free", "positive", "finite", "weak")
+_DRAWS = 5
+
+
+def declares(cls, draws):
+    """A frozen dataclass of `Effect` with a name, a place, sentences, and complete parameters."""
+    if not (isinstance(cls, type) and issubclass(cls, Effect)):
+        raise Broken("no subclass of frac_accel.Effect")
+    if not dataclasses.is_dataclass(cls) or not cls.__dataclass_params__.frozen:
+        raise Broken("no frozen dataclass: put @dataclasses.dataclass(frozen=True) before it")
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", str(getattr(cls, "cause", ""))):
+        raise Broken("`cause` is no name in small letters and underscores")
+    if getattr(cls, "stage", None) not in range(STAMPS + 1):
+        raise Broken("`stage` is none of the places in the signal's way (frac_accel.effects.base)")
+    for name in ("explanation", "experiment"):
+        if not str(getattr(cls, name, "")).endswith("."):
+            raise Broken(f"`{name}` is no sentence that ends with a full stop")
+    for field in dataclasses.fields(cls):
+        if not field.metadata:
+            raise Broken(f"`{field.name}` is not declared with `parameter`")
+        _complete(field)
+    if not cls.read_off and parameter_fields(cls) \
+            and all(field.metadata["null"] is None for field in parameter_fields(cls)):
+        raise Broken("no parameter declares `null`, the value with which it changes nothing")
+    names = {field.name for field in parameter_fields(cls)}
+    for axis in AXES:
+        for excited in (True, False):
+            fitted = cls.fitted_parameters(axis, dict.fromkeys(AXES, excited))
+            if not set(fitted) <= names:
+                raise Broken(f"`fitted_parameters` names {sorted(set(fitted) - names)}, which it "
+                             "does not have")
+
+
+def _complete(field):
+    """Check what one parameter declares of itself."""
+    limits, name = field.metadata, field.name
+    if not limits["unit"] or not isinstance(limits["unit"], str):
+        raise Broken(f"{name}: no `unit` (\"1\" for a pure number)")
+    scale = limits["scale"]
+    factor, of = scale if isinstance(scale, tuple) else (1.0, scale)
+    if isinstance(of, str) and not hasattr(Scales(1.0, 1.0, 1.0), of):
+        raise Broken(f"{name}: `scale` {of!r} is no name of frac_accel.parameters.Scales")
+    if not factor > 0 or (isinstance(of, (int, float)) and not of > 0):
+        raise Broken(f"{name}: `scale` {scale!r}, expected above 0")
+    if limits["step"] is not None and not limits["step"] > 0:
+        raise Broken(f"{name}: `step` {limits['step']!r}, expected above 0")
+    low, high = span(field)
+    if not low < high:
+        raise Broken(f"{name}: no value lies within its bounds and its `reach`")
+    null, default = limits["null"], field.default
+    if null == "core":
+        if not hasattr(CORE, name):
+            raise Broken(f"{name}: `null` is \"core\", but an oscillator has no {name}")
+    elif null is not None:
+        ends = [limits[key] for key in ("above", "minimum", "below", "maximum")]
+        below = [end for end in ends[:2] if end is not None]
+        above = [end for end in ends[2:] if end is not None]
+        # the end itself may be an open one: no effect is then what the parameter tends to
+        if any(null < end for end in below) or any(null > end for end in above) \
+                or math.isnan(null):
+            raise Broken(f"{name}: `null` {null!r} lies beyond its bounds")
+    if default is not dataclasses.MISSING and not (math.isfinite(default)):
+        raise Broken(f"{name}: default {default!r}, expected a finite number")
+
+
+def row(cls):
+    """The cause's row in the table of docs/effects.md."""
+    units = {field.name: field.metadata["unit"] for field in parameter_fields(cls)}
+    parameters = ", ".join(f"`{name}`" + ("" if unit == "1" else f" [{unit}]")
+                           for name, unit in units.items())
+    return f"| `{cls.cause}` | {parameters} | {cls.explanation} |"
+
+
+def documents(cls, draws):
+    """A docstring of its own; a built-in cause also has its row in docs/effects.md."""
+    written = cls.__dict__.get("__doc__") or ""
+    # what a dataclass writes where there is none
+    if not written or written.startswith(f"{cls.__name__}("):
+        raise Broken("the class has no docstring")
+    if cls.__module__.startswith("frac_accel.effects.") and _TABLE.exists() \
+            and row(cls) not in _TABLE.read_text(encoding="utf-8").splitlines():
+        raise Broken(f"docs/effects.md lacks its row: {row(cls)}")
+
+
+def survives_yaml(cls, draws):
+    """Parameters are the same after they were written to a model file and read."""
+    registered = cls.cause in effect_names()
+    if registered and effect_of(cls.cause) is not cls:
+        raise Broken(f"another class, {effect_of(cls.cause).__qualname__}, has this cause's name")
+    for _ in range(_DRAWS):
+        effect = draws.any(cls)
+        if registered:
+            text = yaml.safe_dump(SensorModel(CORE, [effect]).to_dict())
+            again = SensorModel.from_dict(yaml.safe_load(text)).effects[0]
+        else:
+            again = build(cls, yaml.safe_load(yaml.safe_dump(plain(as_mapping(effect)))), cls.cause)
+        if again != effect:
+            raise Broken(f"read back from YAML as {words(again)}, written as {words(effect)}")
+
+
+def starts_within_bounds(cls, draws):
+    """A fit begins, whatever the record holds, with effects of this class that are allowed."""
+    from ..diagnosis.search import View
+    from ..simulation import simulate
+    n = 1024
+    reference = draws.motion(n)
+    temperature = draws.circumstances(n).temperature_c
+    simulated = simulate(sensor_with(), reference, RATE)[:, 0]
+    for effect in (None, draws.usual(cls), draws.usual(cls)):
+        measured = simulated
+        if effect is not None:
+            try:
+                measured = simulate(sensor_with(effect), reference, RATE,
+                                    temperature_c=temperature)[:, 0]
+            except FracAccelError:
+                continue
+        measured = measured + 1e-3 * draws.rng.normal(size=n)
+        view = View(RATE, np.arange(n) / RATE, measured, simulated, measured - simulated,
+                    np.ones(n, bool), CORE, 0.0, float(np.std(measured)), True,
+                    dict.fromkeys(AXES, True), "x")
+        starts = cls.starts(view)
+        if cls.read_off and starts:
+            raise Broken("it is read off a record, but has start points, too")
+        for start in starts:
+            _require_start(cls, start)
+
+
+def _require_start(cls, start):
+    if not isinstance(start, Start) or start.kind not in _KINDS:
+        raise Broken(f"`starts` gives {start!r:.80}, expected those of "
+                     "frac_accel.effects.fit_starts")
+    if start.parameter is not None and not hasattr(start.effect, start.parameter):
+        raise Broken(f"a start scales {start.parameter!r}, which the effect does not have")
+    if not start.columns:
+        raise Broken("a start has no columns")
+    for effect in (start.effect, *start.columns):
+        if type(effect) is not cls:
+            raise Broken(f"a start is a {type(effect).__name__}, expected {cls.__name__}")
+        try:
+            build(cls, as_mapping(effect), "a start: ")
+        except FracAccelError as error:
+            raise Broken(str(error)) from None

@@ -1,0 +1,28 @@
+"""How results show themselves in a notebook."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from typing import Any
+
+
+class Shown:
+    """A result with a line of text and a figure; it says what to draw in `_draw`."""
+
+    def _draw(self, figure: Any) -> None:
+        raise NotImplementedError
+
+    def plot(self) -> Any:
+        """Main figure of this result, as a matplotlib Figure of its own."""
+        from matplotlib.figure import Figure
+        figure = Figure(figsize=(8, 4.5), layout="constrained")
+        self._draw(figure)
+        return figure
+
+    def _repr_html_(self) -> str:
+        image = io.BytesIO()
+        self.plot().savefig(image, format="png", dpi=90)
+        data = base64.b64encode(image.getvalue()).decode()
+        return f'<p>{html.escape(repr(self))}</p><img src="data:image/png;base64,{data}">'
