@@ -439,7 +439,7 @@ class Problem:
     def cost(self, effects):
         """Cost of these causes with the parameters that they have; infinite without a bound."""
         try:
-            return self._point(effects, False).cost
+            return self.point(effects, False).cost
         except FracAccelError:
             return np.inf
 
@@ -498,7 +498,7 @@ class Problem:
             while away < self.time[-1]:
                 moved = dataclasses.replace(fit.effects[unknown.cause],
                                             **{unknown.name: max(here + side * away, 0.0)})
-                point = self._point({**fit.effects, unknown.cause: moved}, False)
+                point = self.point({**fit.effects, unknown.cause: moved}, False)
                 if point.cost > limit:
                     break
                 away *= 1.5
