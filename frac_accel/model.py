@@ -8,11 +8,11 @@ import math
 import numpy as np
 import yaml
 
-from .atomic_file import write_text
 from .core import CORES, Arx
 from .core.static_force import StaticForce
 from .effects import Circumstances, Effect, effect_names, effect_of
 from .errors import ModelError
+from .outputs import write_text
 from .parameters import as_mapping, build, number, parameter_fields, plain
 
 SCHEMA = "frac_accel/sensor_model/1"
