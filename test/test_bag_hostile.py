@@ -3,6 +3,7 @@
 import os
 import resource
 import struct
+import time
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from mcap.writer import CompressionType
 from frac_accel import cdr
 from frac_accel.bag import BagError, BagReader, BagWriter, read_bag, write_bag
 from frac_accel.bag.mcap_file import MAGIC
+from frac_accel.bag.qos import parse_qos
 
 TOPICS = {"/imu/reference": random_samples(1, 200), "/imu/data_raw": random_samples(2, 200)}
 EVERY_MESSAGE = {
@@ -239,6 +241,49 @@ def test_the_error_says_what_is_wrong_and_where(tmp_path, write, says):
         read_bag(path, ["/imu/data_raw"])
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def laughs(levels, fill):
+    """Nested aliases: each level holds the one before it nine times."""
+    lines = ["a0: &a0 {x: 1}"] if fill == "map" else ["a0: &a0 [x]"]
+    for level in range(1, levels):
+        inner = ", ".join([f"*a{level - 1}"] * 9)
+        lines.append(f"a{level}: &a{level} " + (f"{{<<: [{inner}]}}" if fill == "map" else
+                                                f"[{inner}]"))
+    return "\n".join(lines) + "\n" + INFORMATION
+
+
+@pytest.mark.parametrize("text", [laughs(9, "map"), laughs(9, "list"), "[" * 10**5,
+                                  "a: " + "1:" * 500_000 + "1\n" + INFORMATION,
+                                  "x" * (2**21 + 1), "a: !!timestamp x\n" + INFORMATION])
+def test_metadata_that_unfolds_is_refused_in_little_time_and_memory(tmp_path, text):
+    bag = tmp_path / "bag"
+    folder(text)(bag)
+    start, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(BagError, match="not the metadata"):
+        BagReader(bag)
+    write_bag(bag / "bag_0.mcap", TOPICS)
+    assert "is damaged; files are read by name" in BagReader(bag).warnings[0]
+    assert time.process_time() - start < 10
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < before + 100 * 1024
+
+
+def test_a_channels_qos_does_not_unfold(tmp_path):
+    assert parse_qos(laughs(9, "map")) == parse_qos("[" * 10**5) == ()
+
+
+@pytest.mark.parametrize("name", ["pipe.mcap", "bag/bag_0.mcap", "bag/metadata.yaml"])
+def test_a_pipe_is_refused_instead_of_waited_for(tmp_path, name):
+    write_bag(tmp_path / "bag", TOPICS)
+    (tmp_path / name).unlink(missing_ok=True)
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(BagError, match="not a regular file|is missing|none of the files"):
+        BagReader((tmp_path / name) if name == "pipe.mcap" else tmp_path / "bag")
+
+
+def test_a_device_is_no_bag():
+    with pytest.raises(BagError, match="/dev/zero: cannot be read: is not a regular file"):
+        BagReader("/dev/zero")
 
 
 def test_metadata_cannot_name_files_outside_the_folder(tmp_path):

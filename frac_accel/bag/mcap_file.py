@@ -24,6 +24,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Schema, Statistics
 
 from frac_accel.errors import BagError
+from frac_accel.regular_file import open_regular
 
 MAGIC = b"\x89MCAP0\r\n"
 MAX_CHUNK_BYTES = 256 * 2**20
@@ -101,7 +102,7 @@ class McapFile:
         self.warnings: list[str] = []
         self.damaged = False
         try:
-            with open(path, "rb") as stream:
+            with open_regular(path) as stream:
                 self._scan(stream.fileno())
             if self.counts is None or (not self.channels and self.segments):
                 self._count_by_reading()
@@ -110,7 +111,7 @@ class McapFile:
 
     def read(self, segment: Segment) -> Messages:
         """Messages of a segment in log order; `BagError` if it is damaged as a whole."""
-        with open(self.path, "rb") as stream:
+        with open_regular(self.path) as stream:
             data = os.pread(stream.fileno(), segment.size, segment.offset)
         if len(data) != segment.size:
             raise BagError("file became shorter while it was read")

@@ -16,6 +16,7 @@ from ..errors import BagError, FracAccelError
 from ..outputs import guard, write_text
 from ..parameters import plain
 from ..record import Temperature
+from ..regular_file import open_regular
 from ..report import require_plotly
 
 _NUMBERS = re.compile(r"\[([-+.\deEnul,\s]*)\]")
@@ -169,7 +170,7 @@ def provenance(bag, command):
     files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
     digest = hashlib.sha256()
     for file in files:
-        with open(file, "rb") as stream:
+        with open_regular(file) as stream:
             while part := stream.read(1 << 20):
                 digest.update(part)
     try:
