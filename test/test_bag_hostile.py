@@ -1,9 +1,13 @@
 """Damaged and foreign bags: what is whole is read, everything else is one clear `BagError`."""
 
 import os
+import re
 import resource
 import struct
+import subprocess
+import sys
 import time
+import zlib
 
 import numpy as np
 import pytest
@@ -11,7 +15,7 @@ import zstandard
 from bag_fixtures import random_samples, write_foreign_bag
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import Chunk, Header
+from mcap.records import Channel, Chunk, Header, Schema
 from mcap.writer import CompressionType
 
 from frac_accel import cdr
@@ -143,6 +147,72 @@ def test_absurd_lengths_are_not_allocated(tmp_path, compression):
             with pytest.raises(BagError):
                 read_all(path)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < limit
+
+
+def bomb(chunks, body, start_ns=0):
+    """An MCAP of chunks that are all the same body, with true sizes and checksums."""
+    builder = RecordBuilder()
+    Header("ros2", "").write(builder)
+    Schema(1, b"", "ros2msg", cdr.IMU).write(builder)
+    Channel(1, "/imu/data_raw", "cdr", {}, 1).write(builder)
+    data = zstandard.ZstdCompressor(level=9).compress(body)
+    chunk = Chunk("zstd", data, 0, 0, zlib.crc32(body), len(body))
+    for number in range(chunks):
+        chunk.message_start_time = number * start_ns
+        chunk.write(builder)
+    return MAGIC + builder.end()
+
+
+IMU = EVERY_MESSAGE["/imu/data_raw"][0]
+SMALLEST = struct.pack("<BQHIQQ", 5, 22, 1, 0, 0, 0)
+WHOLE = struct.pack("<BQHIQQ", 5, 22 + len(IMU), 1, 0, 10**6, 0) + IMU
+BOMBS = {
+    "one chunk": (lambda: bomb(1, bytes(256 * 2**20 - 1)), "declares|nothing"),
+    "overlapping chunks": (lambda: bomb(30, WHOLE * (8 * 2**20 // len(WHOLE))), "overlap"),
+    "smallest messages": (lambda: bomb(7, SMALLEST * (2**20 // 31)), "too short"),
+    "many chunks": (lambda: bomb(100, WHOLE * (8 * 2**20 // len(WHOLE)), 1), "more than 100 times"),
+    "not records": (lambda: bomb(7, bytes(31 * 2**20), 1), "no messages|nothing"),
+    "damaged schemas": (lambda: bomb(7, struct.pack("<BQ", 3, 0) * 10**6, 1), "nothing"),
+    "large schemas": (lambda: bomb(1, b"".join(
+        struct.pack("<BQ", 3, 4 * 2**20 + 14) + struct.pack("<HIII", number, 0, 0, 4 * 2**20)
+        + bytes(4 * 2**20) for number in range(7))), "no messages|nothing"),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_small_file_does_not_fill_the_memory(tmp_path, name):
+    """Files of at most 200 KB; refused with at most 100 MB, in a process of its own."""
+    make, words = BOMBS[name]
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(make())
+    assert path.stat().st_size < 200_000
+    code = (
+        "import resource, sys\n"
+        "from frac_accel.bag import BagError, read_bag\n"
+        "def used():\n"
+        "    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "before = used()\n"
+        "try:\n"
+        "    read_bag(sys.argv[1], ['/imu/data_raw'])\n"
+        "except BagError as error:\n"
+        "    print(used() - before, error)\n"
+    )
+    start = time.monotonic()
+    result = subprocess.run(
+        [sys.executable, "-c", code, path], capture_output=True, text=True, timeout=60
+    )
+    assert re.search(words, result.stdout), result
+    assert int(result.stdout.split()[0]) < 100 * 1024
+    assert time.monotonic() - start < 20
+
+
+def test_a_large_chunk_of_real_samples_is_read(tmp_path):
+    """Messages that differ do not unpack to a hundredfold, however large their chunk."""
+    path = tmp_path / "large.mcap"
+    samples = random_samples(5, 120_000)
+    write_foreign_bag(path, {"/imu/data_raw": samples}, chunk_size=2**28)
+    read = read_bag(path, ["/imu/data_raw"])["/imu/data_raw"]
+    np.testing.assert_array_equal(read.values, samples.values)
 
 
 def test_a_frame_that_claims_another_size_than_its_chunk(tmp_path):

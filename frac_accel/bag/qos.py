@@ -11,7 +11,7 @@ from frac_accel import safe_yaml
 _RELIABILITY = {1: "reliable", 2: "best_effort"}
 _DURABILITY = {1: "transient_local", 2: "volatile"}
 _HISTORY = {1: "keep_last", 2: "keep_all"}
-_MAX_BYTES = 64 * 1024  # of the YAML; about 300 per publisher
+_MAX_BYTES = 16 * 1024  # of the YAML; about 300 per publisher
 MAX_DEPTH = 1_000_000
 # rmw's "infinite" duration, int64 max in nanoseconds.
 _INFINITE = {"sec": 9223372036, "nsec": 854775807}
