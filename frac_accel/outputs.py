@@ -44,7 +44,7 @@ class Output:
         self._folder, self._lock = _locked_folder(self._parent)
         self.path = self._folder / self.target.name
         self._old = self._folder / ("older" if self.target.name == "old" else "old")
-        self._is_placed = False
+        self._is_placed = self._is_kept = False
         self.is_complete = False
 
     def done(self):
@@ -74,26 +74,30 @@ class Output:
             os.close(self._lock)
             self._folder = None
 
-    def put(self, keep_old):
-        """Rename it to its target; `take_back` undoes that if the old one is kept."""
+    def put(self, is_alone):
+        """Rename it to its target, and keep what was there for `take_back`."""
         if self.to_device:
             with open(self.path, "rb") as source, open(self.target, "ab") as device:
                 shutil.copyfileobj(source, device)
             return
         if self.target.is_dir() and not self.target.is_symlink():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(self.target))
-        if keep_old and os.path.lexists(self.target):
+        self._is_kept = not os.path.lexists(self.target)
+        if not self._is_kept:
             try:
                 os.link(self.target, self._old, follow_symlinks=False)
+                self._is_kept = True
             except OSError:
-                # a file system without hard links
-                os.rename(self.target, self._old)
+                # a file system without hard links: for a moment neither is there
+                if not is_alone:
+                    os.rename(self.target, self._old)
+                    self._is_kept = True
         self._is_placed = True
         os.replace(self.path, self.target)
 
     def take_back(self):
         """Undo `put`."""
-        if self._is_placed and not os.path.lexists(self.path):
+        if self._is_placed and self._is_kept and not os.path.lexists(self.path):
             os.replace(self.target, self.path)
         if os.path.lexists(self._old):
             os.replace(self._old, self.target)
@@ -235,11 +239,10 @@ def sweep(folder):
 
 def _put(outputs):
     """Rename all or none."""
-    keep_old = len(outputs) > 1
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
     try:
         for output in outputs:
-            output.put(keep_old)
+            output.put(len(outputs) == 1)
         for output in outputs:
             output.settle()
     except BaseException:
