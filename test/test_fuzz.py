@@ -14,6 +14,14 @@ def test_damaged_inputs_are_refused_or_worked_on(group):
     assert runner.run(range(group * CASES, (group + 1) * CASES)) == {}
 
 
+# Numbers of cases that once went wrong.
+ONCE_WRONG = [63, 89, 1036, 1091, 1109, 1141, 1347, 1394, 10105, 11442, 11472, 11552, 11658]
+
+
+def test_what_once_went_wrong_does_not_again():
+    assert runner.run(ONCE_WRONG) == {}
+
+
 def test_every_command_has_its_turn_or_a_reason():
     assert {*case.SHARES, *case.WITHOUT} == set(VERBS)
     assert not {*case.SHARES} & {*case.WITHOUT}

@@ -94,11 +94,17 @@ def compute_once(monkeypatch):
                        ("validate", "validate"), ("simulate", "simulate")):
         module = importlib.import_module(f"frac_accel.commands.{verb}")
 
-        def once(*arguments, function=getattr(module, name), results=[], **options):  # noqa: B006
-            if not results:
-                results.append(function(*arguments, **options))
-            return results[0]
-        monkeypatch.setattr(module, name, once)
+        monkeypatch.setattr(module, name, _once(getattr(module, name)))
+
+
+def _once(function):
+    results = []
+
+    def once(*arguments, **options):
+        if not results:
+            results.append(function(*arguments, **options))
+        return results[0]
+    return once
 
 
 def content(folder):
@@ -118,6 +124,8 @@ def test_a_write_that_fails_leaves_everything_as_it_was(command, error, existing
                                                         monkeypatch, capsys, failing):
     if existing and error == "input/output error":
         pytest.skip("as a full disk")
+    if command == "paper" and (existing or error != "disk full"):
+        pytest.skip("its page takes seconds, and is written as that of the others")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("TQDM_DISABLE", "1")
     write_bag("in.mcap", seeds.samples(np.random.default_rng(1), {

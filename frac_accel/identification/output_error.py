@@ -235,6 +235,9 @@ class _Problem:
         """Most promising starting points: the grid's best, improved on the averaged response."""
         bulk = bulk_delay(self.reference, self.whole)
         frequency, response, weight = averaged_response(self.reference, self.whole, self.rate, bulk)
+        if not len(frequency):
+            raise IdentificationError("no frequency is left at which the record says how the "
+                                      "sensor responds")
         s = 2j * np.pi * frequency
         prepared = self.structure.prepare(s)
         peak = frequency[np.argmax(np.abs(response))]

@@ -114,6 +114,8 @@ def _require_no_copy(reference, sensor, valid, lattice):
     n = len(sensor) - abs(delay)
     first, second = (slice(start, start + n) for start in (max(-delay, 0), max(delay, 0)))
     both = valid[first] & valid[second]
+    if not both.any():
+        return
     x, y = reference[first][both], sensor[second][both]
     x, middle = x - x.mean(), y - y.mean()
     power = x @ x
