@@ -190,6 +190,8 @@ class _Problem:
         edge = min(_EDGE, self.n // 8)
         used = np.ones(self.n, bool) if valid is None else valid.copy()
         used[:edge] = used[-edge:] = False
+        if not used.any():
+            raise IdentificationError("no sample is left in both topics, away from the ends")
         self.used = used
         self.judged = slice(edge, self.n - edge) if used.sum() == self.n - 2 * edge else used
         self.sensor = sensor[self.judged]
