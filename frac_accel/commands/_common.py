@@ -21,7 +21,7 @@ from ..report import require_plotly
 
 _NUMBERS = re.compile(r"\[([-+.\deEnul,\s]*)\]")
 # Options that name files, of all verbs.
-INPUTS = ("bag", "bags", "model")
+INPUTS = ("bag", "bags", "model", "result")
 OUTPUTS = ("output", "extended_model", "report", "json")
 
 
@@ -163,6 +163,11 @@ def step(bar, words):
     bar.update()
 
 
+def printable(name):
+    """A name of a file as text that any file of ours can hold."""
+    return name.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def provenance(bag, command):
     """Where a result comes from: the bag, its content's hash, the command and our version."""
     from importlib.metadata import PackageNotFoundError, version
@@ -177,7 +182,7 @@ def provenance(bag, command):
         ours = version("frac_accel")
     except PackageNotFoundError:
         ours = "not installed"
-    return {"bag": path.name, "sha256": digest.hexdigest(), "command": command,
+    return {"bag": printable(path.name), "sha256": digest.hexdigest(), "command": printable(command),
             "frac_accel_version": ours}
 
 

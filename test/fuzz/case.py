@@ -8,8 +8,10 @@ from frac_accel.bag import Samples, write_bag
 from . import damage, seeds
 
 # How often each command has its turn; those without an entry read no such input, with the reason.
-SHARES = {"correct": 0.3, "simulate": 0.2, "validate": 0.2, "identify": 0.17, "diagnose": 0.13}
+SHARES = {"correct": 0.3, "simulate": 0.2, "validate": 0.2, "identify": 0.15, "diagnose": 0.1,
+          "budget": 0.05}
 WITHOUT = {"paper": "its study takes minutes; it reads bags as identify and diagnose do",
+           "report": "it reads results only, which a test of its own damages",
            "bench": "it reads no file"}
 DAMAGES = {"bag octets": 0.2, "bag records": 0.25, "bag samples": 0.2, "metadata": 0.08,
            "model tree": 0.17, "model text": 0.07, "nothing": 0.03}
@@ -35,7 +37,7 @@ def make(number, folder):
     bag = _bag(what, folder, rng)
     (folder / "m.yaml").write_bytes(_model(what, rng))
     arguments, outputs = [verb, str(bag)], []
-    if verb != "identify" and not (verb == "diagnose" and rng.random() < 0.3
+    if verb != "identify" and not (verb in ("diagnose", "budget") and rng.random() < 0.3
                                    and not what.startswith("model")):
         arguments += ["--model", str(folder / "m.yaml")]
 
