@@ -182,8 +182,8 @@ def provenance(bag, command):
         ours = version("frac_accel")
     except PackageNotFoundError:
         ours = "not installed"
-    return {"bag": printable(path.name), "sha256": digest.hexdigest(), "command": printable(command),
-            "frac_accel_version": ours}
+    return {"bag": printable(path.name), "sha256": digest.hexdigest(),
+            "command": printable(command), "frac_accel_version": ours}
 
 
 def _without_nan(value):

@@ -50,7 +50,8 @@ def run(arguments):
     source = _provenance(bags, command)
     with progress(None, unit="step") as bar:
         result = identify(pairs, arguments.axis, arguments.structure, source,
-                          lambda words: step(bar, words), [printable(Path(bag).name) for bag in bags])
+                          lambda words: step(bar, words),
+                          [printable(Path(bag).name) for bag in bags])
     result.model.save(arguments.output)
     _print(result, pairs, bags)
     say(f"{arguments.output}: written")
