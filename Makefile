@@ -1,4 +1,4 @@
-# make setup | demo | test | lint | bench | soak | blind | browser | pins | clean
+# make setup | demo | test | lint | bench | soak | blind | fuzz | browser | pins | clean
 # Needs Python 3.10 to 3.13, git and make. PYTHON=python3.12 chooses the Python of .venv.
 
 # A ROS that is sourced, or another venv with ROS, must not leak into ours.
@@ -6,7 +6,7 @@ unexport PYTHONPATH LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DELETE_ON_ERROR:
-.PHONY: setup demo test test-oldest lint bench soak blind browser pins clean FORCE
+.PHONY: setup demo test test-oldest lint bench soak blind fuzz browser pins clean FORCE
 
 venv := .venv
 oldest := .venv-oldest
@@ -57,6 +57,12 @@ blind: export OPENBLAS_NUM_THREADS := 1
 blind: setup
 	PYTHONPATH=test:. $(python) -m blind $(BLIND)
 
+# Damaged inputs for all commands until Ctrl-C; FUZZ="--first 0 --count 1000" for some of them.
+# What goes wrong is kept in fuzz_found/ with its inputs.
+fuzz: export OPENBLAS_NUM_THREADS := 1
+fuzz: setup
+	PYTHONPATH=test:. $(python) -m fuzz $(FUZZ)
+
 # Without a Chromium the tests of the reports in a browser are skipped. No other target touches the
 # system: this one is for machines that are ours to change, such as those of continuous integration.
 browser:
@@ -85,14 +91,15 @@ endif
 $(venv)/.done: requirements/venv.txt
 	found=$$(sh tools/find_python.sh 13 $(or $(PYTHON),$(pythons))) && \
 	    rm -rf $(venv) && "$$found" -m venv $(venv)
-	$(python) -m pip install -q $$(grep '^setuptools==' $<)
-	$(python) -m pip install -q --no-deps --no-build-isolation --use-pep517 -r $<
+	sed -n '/^setuptools==/,/[^\\]$$/p' $< > $(venv)/setuptools.txt
+	$(python) -m pip install -q --require-hashes --no-deps -r $(venv)/setuptools.txt
+	$(python) -m pip install -q --require-hashes --no-deps --no-build-isolation --use-pep517 -r $<
 	for shell in sh bash; do cp tools/wheels_setup.sh $(venv)/local_setup.$$shell || exit; done
 	echo "$(CURDIR) $$($(python) -V)" > $@
 
 $(oldest)/.done: requirements/oldest.txt
 	found=$$($(find_oldest)) && rm -rf $(oldest) && "$$found" -m venv $(oldest)
-	$(oldest)/bin/python -m pip install -q --no-deps -r $<
+	$(oldest)/bin/python -m pip install -q --require-hashes --no-deps -r $<
 	touch $@
 
 $(venv)/.frac_accel: $(venv)/.done $(metadata)

@@ -1,11 +1,14 @@
 """The command ``frac_accel``: one verb per file of `frac_accel.commands`."""
 
 import argparse
+import contextlib
 import importlib
 import sys
 
 from . import one_thread
 from .errors import FracAccelError
+from .outputs import together
+from .process import Stopped, stopping_cleanly, tolerant_output, write_details
 
 one_thread.prefer()
 
@@ -34,7 +37,10 @@ def main(arguments=None):
     Returns
     -------
     int
-        Exit status: 0 done, whatever the verdict; 2 bad input, with one line that says what.
+        Exit status: 0 done, whatever the verdict; 2 bad input, or files that cannot be read or
+        written, with one line that says what; 3 an error that nobody has foreseen, with one line
+        that says where its details are; 128 and the signal's number if it was stopped. Unless it
+        is 0, no output was written.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     parser = argparse.ArgumentParser(
@@ -49,19 +55,37 @@ def main(arguments=None):
               f"pip install {error.name}", file=sys.stderr)
         return 2
     chosen = parser.parse_args(arguments)
+    with tolerant_output():
+        return _run(chosen, modules[chosen.verb], arguments)
+
+
+def _run(chosen, module, arguments):
+    from .commands._common import guard_files
+    status = 2
     try:
-        modules[chosen.verb].run(chosen)
-    except FracAccelError as error:
-        print(f"frac_accel {chosen.verb}: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    except BrokenPipeError:
-        # whoever read the output has seen enough
-        sys.stdout = None
+        with stopping_cleanly(), together():
+            guard_files(chosen)
+            module.run(chosen)
+            sys.stdout.flush()
+        sys.stdout.flush()
         return 0
+    except FracAccelError as error:
+        words = str(error)
+    except OSError as error:
+        words = ": ".join(str(part) for part in (error.filename, error.strerror or error)
+                          if part is not None)
+    except MemoryError:
+        words = "there is not enough memory for this input"
     except KeyboardInterrupt:
-        print(f"frac_accel {chosen.verb}: interrupted", file=sys.stderr)
-        return 130
-    return 0
+        words, status = "interrupted", 130
+    except Stopped as stopped:
+        words, status = f"stopped by {stopped.signal.name}", 128 + stopped.signal
+    except Exception as error:
+        words, status = (f"an error that nobody has foreseen ({type(error).__name__}); details: "
+                         f"{write_details(error, arguments)}"), 3
+    with contextlib.suppress(OSError):
+        print(f"frac_accel {chosen.verb}: {' '.join(words.split())}", file=sys.stderr, flush=True)
+    return status
 
 
 def _add_verbs(verbs, arguments):

@@ -4,18 +4,21 @@ import dataclasses
 import difflib
 import functools
 import math
+import re
 
 import numpy as np
 import yaml
 
-from .atomic_file import write_text
+from . import safe_yaml
 from .core import CORES, Arx
 from .core.static_force import StaticForce
 from .effects import Circumstances, Effect, effect_names, effect_of
 from .errors import ModelError
+from .outputs import write_text
 from .parameters import as_mapping, build, number, parameter_fields, plain
 
 SCHEMA = "frac_accel/sensor_model/1"
+_ANY_SCHEMA = r"frac_accel/sensor_model/\d{1,3}"
 AXES = "xyz"
 _OWN_KEYS = ("schema", "core", "effects", "axes", "reference_faults")
 _LARGEST_FILE = 10_000_000
@@ -252,10 +255,8 @@ class SensorModel:
 
     @classmethod
     def _from_dict(cls, data):
-        _require_mapping(data, "model")
+        _require_schema(data)
         _require_known_keys(data)
-        if data.get("schema") != SCHEMA:
-            raise ModelError(f"schema: {data.get('schema')!r} given, expected {SCHEMA!r}")
         core = _core(data["core"], "core") if "core" in data else None
         effects = _effects(data.get("effects"), "effects")
         axes = {}
@@ -279,7 +280,7 @@ class SensorModel:
                                  "180.0, damping_ratio: 0.15}")
             core = axes["x"].core
         if "noise_std" in data and number(data["noise_std"], "noise_std") < 0:
-            raise ModelError(f"noise_std: {data['noise_std']} given, expected at least 0")
+            raise ModelError(f"noise_std: {data['noise_std']!s:.60} given, expected at least 0")
         if "band_hz" in data:
             _require_band(data["band_hz"])
         metadata = {key: plain(data[key]) for key in data if key not in _OWN_KEYS}
@@ -315,12 +316,11 @@ class SensorModel:
             raise ModelError(f"{path}: larger than {_LARGEST_FILE // 1_000_000} MB, "
                              "expected a sensor model")
         try:
-            data = yaml.load(text, Loader=_Loader)
-        except (yaml.YAMLError, RecursionError, ValueError) as error:
-            mark = getattr(error, "problem_mark", None)
-            line = f", line {mark.line + 1}" if mark else ""
-            problem = getattr(error, "problem", None) or type(error).__name__
-            raise ModelError(f"{path}{line}: not valid YAML: {problem}") from None
+            data = safe_yaml.load(text)
+        except safe_yaml.YamlError as error:
+            is_quoted = not error.quotes or _says_it_is_a_model(text)
+            problem = f": {error.problem}" if is_quoted else ""
+            raise ModelError(f"{path}{error.where}: not valid YAML{problem}") from None
         return cls.from_dict(data, where=str(path))
 
     def save(self, path):
@@ -338,6 +338,23 @@ def _applied(stages, values, circumstances):
     return values
 
 
+def _require_schema(data):
+    """Nothing of other files is quoted: they may be secret, and who asks may be far away."""
+    if not isinstance(data, dict):
+        kind = "nothing" if data is None else f"a {type(data).__name__}"
+        raise ModelError(f"model: {kind} given, expected a mapping")
+    schema = data.get("schema")
+    if schema != SCHEMA:
+        given = (repr(schema) if re.fullmatch(_ANY_SCHEMA, str(schema)) else
+                 "something else" if "schema" in data else "nothing")
+        raise ModelError(f"schema: {given} given, expected {SCHEMA!r}")
+
+
+def _says_it_is_a_model(text):
+    """Whether a line of the text says so, as far as can be said where YAML is not read."""
+    return re.search(rf"""^schema:\s*['"]?{_ANY_SCHEMA}\b""", text, re.M) is not None
+
+
 def _removed(stages, values, variance, circumstances):
     for cause, by_axis in reversed(stages):
         values, variance = cause.invert_axes(values, variance, by_axis, circumstances)
@@ -352,29 +369,6 @@ def _sample_stages(axes):
             stages.setdefault((effect.stage, effect.cause), {})[index] = effect
     return [(type(next(iter(by_axis.values()))), by_axis)
             for _, by_axis in sorted(stages.items(), key=lambda item: item[0])]
-
-
-class _Loader(yaml.SafeLoader):
-    """Safe YAML without aliases (a small file could unfold to fill the memory) or twin keys."""
-
-    def compose_node(self, parent, index):
-        if self.check_event(yaml.AliasEvent):
-            event = self.peek_event()
-            raise yaml.composer.ComposerError(None, None, "an alias, which a model does not need",
-                                              event.start_mark)
-        return super().compose_node(parent, index)
-
-    def construct_mapping(self, node, deep=False):
-        seen = set()
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                raise yaml.constructor.ConstructorError(None, None, "a key that is not plain text",
-                                                        key.start_mark)
-            if key.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"the key {key.value!r} stands twice", key.start_mark)
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)
 
 
 def is_link(effect):
@@ -414,14 +408,14 @@ def _require_band(band):
         raise ModelError(f"band_hz: {band!r:.60} given, expected {expected}")
     low, high = (number(edge, f"band_hz[{i}]", expected) for i, edge in enumerate(band))
     if not 0 <= low < high:
-        raise ModelError(f"band_hz: {band!r} given, expected {expected}")
+        raise ModelError(f"band_hz: {band!r:.60} given, expected {expected}")
 
 
 def _core(entry, where):
     entry = dict(_require_mapping(entry, where))
     kind = entry.pop("type", "oscillator")
     if not isinstance(kind, str) or kind not in CORES:
-        raise ModelError(f"{where}.type: {kind!r} given, expected one of {', '.join(CORES)}")
+        raise ModelError(f"{where}.type: {kind!r:.60} given, expected one of {', '.join(CORES)}")
     if CORES[kind] is not Arx:
         for field in parameter_fields(Arx):
             if field.name in entry:
@@ -451,7 +445,7 @@ def _effects(entries, where):
         if not isinstance(cause, str) or cause not in known:
             close = difflib.get_close_matches(str(cause), known, n=1)
             hint = f"; did you mean {close[0]!r}?" if close else ""
-            raise ModelError(f"{place}.cause: unknown cause {cause!r}, expected one of "
+            raise ModelError(f"{place}.cause: unknown cause {cause!r:.60}, expected one of "
                              f"{', '.join(known)}{hint}")
         try:
             effect = effect_of(cause)

@@ -181,7 +181,7 @@ def number(value, where, expected="a number"):
             result = math.nan
         if math.isfinite(result):
             return result
-    raise ModelError(f"{where}: {value!r} given, expected {expected}")
+    raise ModelError(f"{where}: {value!r:.60} given, expected {expected}")
 
 
 def _in_range(value, field, where):
@@ -206,7 +206,7 @@ def _word(value, field, where):
 
 def _numbers(value, where):
     if not isinstance(value, (list, tuple)) or not value:
-        raise ModelError(f"{where}: {value!r} given, expected a list of numbers")
+        raise ModelError(f"{where}: {value!r:.60} given, expected a list of numbers")
     return tuple(number(item, f"{where}[{i}]") for i, item in enumerate(value))
 
 

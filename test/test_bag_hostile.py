@@ -1,8 +1,13 @@
 """Damaged and foreign bags: what is whole is read, everything else is one clear `BagError`."""
 
 import os
+import re
 import resource
 import struct
+import subprocess
+import sys
+import time
+import zlib
 
 import numpy as np
 import pytest
@@ -10,12 +15,13 @@ import zstandard
 from bag_fixtures import random_samples, write_foreign_bag
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import Chunk, Header
+from mcap.records import Channel, Chunk, Header, Schema
 from mcap.writer import CompressionType
 
 from frac_accel import cdr
 from frac_accel.bag import BagError, BagReader, BagWriter, read_bag, write_bag
 from frac_accel.bag.mcap_file import MAGIC
+from frac_accel.bag.qos import parse_qos
 
 TOPICS = {"/imu/reference": random_samples(1, 200), "/imu/data_raw": random_samples(2, 200)}
 EVERY_MESSAGE = {
@@ -143,6 +149,72 @@ def test_absurd_lengths_are_not_allocated(tmp_path, compression):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < limit
 
 
+def bomb(chunks, body, start_ns=0):
+    """An MCAP of chunks that are all the same body, with true sizes and checksums."""
+    builder = RecordBuilder()
+    Header("ros2", "").write(builder)
+    Schema(1, b"", "ros2msg", cdr.IMU).write(builder)
+    Channel(1, "/imu/data_raw", "cdr", {}, 1).write(builder)
+    data = zstandard.ZstdCompressor(level=9).compress(body)
+    chunk = Chunk("zstd", data, 0, 0, zlib.crc32(body), len(body))
+    for number in range(chunks):
+        chunk.message_start_time = number * start_ns
+        chunk.write(builder)
+    return MAGIC + builder.end()
+
+
+IMU = EVERY_MESSAGE["/imu/data_raw"][0]
+SMALLEST = struct.pack("<BQHIQQ", 5, 22, 1, 0, 0, 0)
+WHOLE = struct.pack("<BQHIQQ", 5, 22 + len(IMU), 1, 0, 10**6, 0) + IMU
+BOMBS = {
+    "one chunk": (lambda: bomb(1, bytes(256 * 2**20 - 1)), "declares|nothing"),
+    "overlapping chunks": (lambda: bomb(30, WHOLE * (8 * 2**20 // len(WHOLE))), "overlap"),
+    "smallest messages": (lambda: bomb(7, SMALLEST * (2**20 // 31)), "too short"),
+    "many chunks": (lambda: bomb(100, WHOLE * (8 * 2**20 // len(WHOLE)), 1), "more than 100 times"),
+    "not records": (lambda: bomb(7, bytes(31 * 2**20), 1), "no messages|nothing"),
+    "damaged schemas": (lambda: bomb(7, struct.pack("<BQ", 3, 0) * 10**6, 1), "nothing"),
+    "large schemas": (lambda: bomb(1, b"".join(
+        struct.pack("<BQ", 3, 4 * 2**20 + 14) + struct.pack("<HIII", number, 0, 0, 4 * 2**20)
+        + bytes(4 * 2**20) for number in range(7))), "no messages|nothing"),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_small_file_does_not_fill_the_memory(tmp_path, name):
+    """Files of at most 200 KB; refused with at most 100 MB, in a process of its own."""
+    make, words = BOMBS[name]
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(make())
+    assert path.stat().st_size < 200_000
+    code = (
+        "import resource, sys\n"
+        "from frac_accel.bag import BagError, read_bag\n"
+        "def used():\n"
+        "    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "before = used()\n"
+        "try:\n"
+        "    read_bag(sys.argv[1], ['/imu/data_raw'])\n"
+        "except BagError as error:\n"
+        "    print(used() - before, error)\n"
+    )
+    start = time.monotonic()
+    result = subprocess.run(
+        [sys.executable, "-c", code, path], capture_output=True, text=True, timeout=60
+    )
+    assert re.search(words, result.stdout), result
+    assert int(result.stdout.split()[0]) < 100 * 1024
+    assert time.monotonic() - start < 20
+
+
+def test_a_large_chunk_of_real_samples_is_read(tmp_path):
+    """Messages that differ do not unpack to a hundredfold, however large their chunk."""
+    path = tmp_path / "large.mcap"
+    samples = random_samples(5, 120_000)
+    write_foreign_bag(path, {"/imu/data_raw": samples}, chunk_size=2**28)
+    read = read_bag(path, ["/imu/data_raw"])["/imu/data_raw"]
+    np.testing.assert_array_equal(read.values, samples.values)
+
+
 def test_a_frame_that_claims_another_size_than_its_chunk(tmp_path):
     frame = bytearray(zstandard.ZstdCompressor().compress(bytes(2**20)))
     assert zstandard.get_frame_parameters(bytes(frame)).content_size == 2**20
@@ -239,6 +311,49 @@ def test_the_error_says_what_is_wrong_and_where(tmp_path, write, says):
         read_bag(path, ["/imu/data_raw"])
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def laughs(levels, fill):
+    """Nested aliases: each level holds the one before it nine times."""
+    lines = ["a0: &a0 {x: 1}"] if fill == "map" else ["a0: &a0 [x]"]
+    for level in range(1, levels):
+        inner = ", ".join([f"*a{level - 1}"] * 9)
+        lines.append(f"a{level}: &a{level} " + (f"{{<<: [{inner}]}}" if fill == "map" else
+                                                f"[{inner}]"))
+    return "\n".join(lines) + "\n" + INFORMATION
+
+
+@pytest.mark.parametrize("text", [laughs(9, "map"), laughs(9, "list"), "[" * 10**5,
+                                  "a: " + "1:" * 500_000 + "1\n" + INFORMATION,
+                                  "x" * (2**21 + 1), "a: !!timestamp x\n" + INFORMATION])
+def test_metadata_that_unfolds_is_refused_in_little_time_and_memory(tmp_path, text):
+    bag = tmp_path / "bag"
+    folder(text)(bag)
+    start, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(BagError, match="not the metadata"):
+        BagReader(bag)
+    write_bag(bag / "bag_0.mcap", TOPICS)
+    assert "is damaged; files are read by name" in BagReader(bag).warnings[0]
+    assert time.process_time() - start < 10
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < before + 100 * 1024
+
+
+def test_a_channels_qos_does_not_unfold(tmp_path):
+    assert parse_qos(laughs(9, "map")) == parse_qos("[" * 10**5) == ()
+
+
+@pytest.mark.parametrize("name", ["pipe.mcap", "bag/bag_0.mcap", "bag/metadata.yaml"])
+def test_a_pipe_is_refused_instead_of_waited_for(tmp_path, name):
+    write_bag(tmp_path / "bag", TOPICS)
+    (tmp_path / name).unlink(missing_ok=True)
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(BagError, match="not a regular file|is missing|none of the files"):
+        BagReader((tmp_path / name) if name == "pipe.mcap" else tmp_path / "bag")
+
+
+def test_a_device_is_no_bag():
+    with pytest.raises(BagError, match="/dev/zero: cannot be read: is not a regular file"):
+        BagReader("/dev/zero")
 
 
 def test_metadata_cannot_name_files_outside_the_folder(tmp_path):

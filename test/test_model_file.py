@@ -128,11 +128,11 @@ def test_three_axes_without_a_common_core():
 BAD = [
     # the file as a whole
     (None, ["model", "nothing given", "mapping"]),
-    ([1], ["model", "[1] given", "mapping"]),
-    ("text", ["model", "'text' given"]),
-    ({}, ["schema", "None given", SCHEMA]),
+    ([1], ["model", "a list given", "mapping"]),
+    ("text", ["model", "a str given"]),
+    ({}, ["schema", "nothing given", SCHEMA]),
     (data_of(schema="frac_accel/sensor_model/2"), ["schema", "sensor_model/2", SCHEMA]),
-    (data_of(schema=1), ["schema", "1 given"]),
+    (data_of(schema=1), ["schema", "something else given"]),
     (data_of(core=...), ["core", "missing"]),
     (data_of(core=None), ["core", "nothing given", "mapping"]),
     (data_of(core=[180, 0.15]), ["core", "[180, 0.15] given", "mapping"]),
@@ -260,6 +260,10 @@ TEXTS = {
     "mapping as key": ("? {a: 1}\n: 3\n", "not valid YAML"),
     "control character": ("a: \x07", "not valid YAML"),
     "impossible date": ("a: 2024-99-99", "not valid YAML"),
+    "long number": ("a: " + "1:" * 400_000 + "1", "a number of"),
+    "long hexadecimal": (f"schema: {SCHEMA}\nnoise_std: 0x{'f' * 6000}\n", "a number of 6002"),
+    "a tag that makes nothing": ("a: !!timestamp x", "a tag"),
+    "a number that is none": ("a: 0b_", "not valid YAML"),
     "empty": ("", "nothing given"),
     "only a comment": ("# nothing\n", "nothing given"),
 }
@@ -275,6 +279,39 @@ def test_bad_text_is_refused_with_the_file(name, tmp_path):
     message = str(caught.value)
     assert str(path) in message and word in message
     assert "\n" not in message and len(message) < 500
+
+
+SECRETS = {
+    "passwd": "root:x:0:0:root:/root:/bin/bash\n",
+    "environment": "db_password=hunter2\n",
+    "yaml": "schema: hunter2\ndb_password: hunter2\n",
+    "twins": "hunter2: 1\nhunter2: 2\n",
+    "list": "- hunter2\n",
+    "broken": "hunter2: [*hunter2, %hunter2, `hunter2\n",
+    "tag": "a: !hunter2 b\n",
+    "escape": 'a: "\\qhunter2"\n',
+    "directive": "%hunter2 x\n---\na: 1\n",
+    "model elsewhere": "hunter2: 'schema: frac_accel/sensor_model/1'\n",
+    "schema alone": "frac_accel/sensor_model/1: hunter2",
+    "almost a schema": "schema: frac_accel/sensor_model/hunter2",
+}
+
+
+@pytest.mark.parametrize("name", SECRETS)
+def test_nothing_is_quoted_of_a_file_that_is_no_model(name, tmp_path):
+    path = tmp_path / "model.yaml"
+    path.write_text(SECRETS[name])
+    with pytest.raises(ModelError) as caught:
+        SensorModel.load(path)
+    message = str(caught.value).replace(str(path), "")
+    for word in ("hunter2", "root", "db_password", "q"):
+        assert word not in message.replace("expected", "")
+
+
+def test_a_long_value_is_quoted_in_part():
+    with pytest.raises(ModelError) as caught:
+        SensorModel.from_dict(data_of(noise_std="x" * 10**6))
+    assert len(str(caught.value)) < 200
 
 
 def test_files_that_are_none(tmp_path):

@@ -1,6 +1,10 @@
 """Resolve ``requirements/NAME.in`` for several Pythons into one pinned ``requirements/NAME.txt``.
 
+Each pin carries the hashes of all its files, so that pip takes no other, whoever serves it.
+
 usage: python tools/pin_requirements.py requirements/venv.in PYTHON [PYTHON ...]
+       python tools/pin_requirements.py requirements/venv.in
+           (without Pythons: the hashes of the pins that there are, anew)
 """
 
 import json
@@ -47,11 +51,40 @@ def pins(resolved):
             yield f"{name}=={version}" + (" ; " + " and ".join(bounds) if bounds else "")
 
 
+def with_hashes(lines):
+    """Return the requirement lines `lines` as one text with the hashes of all files of each."""
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+        subprocess.run([f"{folder}/bin/python", "-m", "pip", "install", "--quiet", "uv"],
+                       check=True)
+        pinned, hashed = Path(folder) / "pins.in", Path(folder) / "pins.txt"
+        pinned.write_text("\n".join(lines) + "\n")
+        subprocess.run([f"{folder}/bin/uv", "pip", "compile", "--quiet", "--universal",
+                        "--no-deps", "--generate-hashes", "--no-header", "--no-annotate",
+                        "--python-version", "3.10", "--output-file", hashed, pinned], check=True)
+        text = hashed.read_text()
+    names = [line for line in text.splitlines() if "==" in line]
+    if len(names) != len(lines) or text.count(" \\\n    --hash=") < len(lines):
+        raise SystemExit(f"{len(lines)} pins, but hashes of {len(names)}")
+    return text
+
+
+def pinned_before(path):
+    """Yield the requirement lines of a file without their hashes."""
+    for line in path.read_text().splitlines():
+        if "==" in line:
+            yield line.removesuffix(" \\")
+
+
 def main():
     source = Path(sys.argv[1])
-    resolved = {python_version(python): resolve(python, source) for python in sys.argv[2:]}
-    lines = [f"# Made from {source.name} by `make pins`.", *pins(resolved)]
-    source.with_suffix(".txt").write_text("\n".join(lines) + "\n")
+    target = source.with_suffix(".txt")
+    if sys.argv[2:]:
+        lines = [*pins({python_version(python): resolve(python, source)
+                        for python in sys.argv[2:]})]
+    else:
+        lines = [*pinned_before(target)]
+    target.write_text(f"# Made from {source.name} by `make pins`.\n" + with_hashes(lines))
 
 
 if __name__ == "__main__":

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path, PurePosixPath
 
-import yaml
-
+from frac_accel import safe_yaml
 from frac_accel.errors import BagError
+from frac_accel.regular_file import read_text
 
 METADATA_NAME = "metadata.yaml"
-_MAX_METADATA_BYTES = 16 * 2**20
+# Thousands of files and topics; rosbag2 writes some 200 bytes for a file, 1 KB for a topic.
+_MAX_METADATA_BYTES = 2 * 2**20
 
 
 def bag_files(path: Path) -> tuple[list[Path], list[str]]:
@@ -57,16 +58,14 @@ def bag_files(path: Path) -> tuple[list[Path], list[str]]:
 
 def _information(metadata: Path) -> dict | None:
     try:
-        if metadata.stat().st_size > _MAX_METADATA_BYTES:
-            return None
-        document = yaml.safe_load(metadata.read_text(encoding="utf-8"))
+        document = safe_yaml.load(read_text(metadata, _MAX_METADATA_BYTES))
         information = document["rosbag2_bagfile_information"]
         names = information["relative_file_paths"]
         if isinstance(names, list) and names and all(isinstance(name, str) for name in names):
             return information
     except OSError as error:
         raise BagError(f"{metadata}: cannot be read: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError, ValueError, RecursionError):
+    except (ValueError, KeyError, TypeError):
         pass
     return None
 

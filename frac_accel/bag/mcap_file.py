@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import struct
 import zlib
+from array import array
 from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
@@ -24,12 +25,19 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Schema, Statistics
 
 from frac_accel.errors import BagError
+from frac_accel.regular_file import open_regular
 
 MAGIC = b"\x89MCAP0\r\n"
 MAX_CHUNK_BYTES = 256 * 2**20
 """Largest chunk (uncompressed) that is read; rosbag2 and mcap write about 1 MiB."""
 
+# A small file must not fill the memory: more than this only of what is a hundredth of it on disk.
+_UNSUSPECTED_BYTES = 32 * 2**20
+_LARGEST_RATIO = 100
 _MAX_DESCRIPTION_BYTES = 16 * 2**20  # schema, channel, header, statistics
+_MAX_DESCRIPTIONS_BYTES = 8 * 2**20  # schemas and channels that are kept, together
+_UNSUSPECTED_TOTAL = 256 * 2**20
+_MOST_DAMAGE = 100  # records in a chunk that do not belong there or are damaged; warnings
 _LOOSE_BYTES = 2**20
 _MAX_TIME = 2**63 - 1
 _RECORD = struct.Struct("<BQ")
@@ -47,6 +55,11 @@ _MESSAGE_HEADER = np.dtype(
         "itemsize": 22,
     }
 )
+
+
+def allowed_bytes(size: int, most: int, unsuspected: int = _UNSUSPECTED_BYTES) -> int:
+    """Bytes that ``size`` ones on disk may unpack to; never more than ``most``."""
+    return min(most, max(unsuspected, _LARGEST_RATIO * size))
 
 
 class Segment(NamedTuple):
@@ -100,8 +113,11 @@ class McapFile:
         self.counts: dict[int, int] | None = None
         self.warnings: list[str] = []
         self.damaged = False
+        self.size = 0
+        self._description_bytes = 0
         try:
-            with open(path, "rb") as stream:
+            with open_regular(path) as stream:
+                self.size = os.fstat(stream.fileno()).st_size
                 self._scan(stream.fileno())
             if self.counts is None or (not self.channels and self.segments):
                 self._count_by_reading()
@@ -110,7 +126,7 @@ class McapFile:
 
     def read(self, segment: Segment) -> Messages:
         """Messages of a segment in log order; `BagError` if it is damaged as a whole."""
-        with open(self.path, "rb") as stream:
+        with open_regular(self.path) as stream:
             data = os.pread(stream.fileno(), segment.size, segment.offset)
         if len(data) != segment.size:
             raise BagError("file became shorter while it was read")
@@ -118,14 +134,14 @@ class McapFile:
         return self._parse(body, segment)
 
     def damage(self, message: str) -> None:
-        """Note damage once."""
+        """Note damage once; of very much damage, the beginning."""
         self.damaged = True
         warning = f"{self.path}: {message}"
-        if warning not in self.warnings:
+        if warning not in self.warnings and len(self.warnings) < _MOST_DAMAGE:
             self.warnings.append(warning)
 
     def _scan(self, descriptor: int) -> None:
-        size = os.fstat(descriptor).st_size
+        size = self.size
         head = os.pread(descriptor, 16, 0)
         if size == 0:
             raise BagError(f"{self.path}: file is empty")
@@ -161,7 +177,7 @@ class McapFile:
                 self.damage("has no header record")
             if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 kind = Schema if opcode == Opcode.SCHEMA else Channel
-                self._register(self._description(descriptor, kind, start, length))
+                self._register(self._description(descriptor, kind, start, length), length)
                 if not in_summary:
                     loose.add(position - _RECORD.size - length, position, None)
             elif opcode == Opcode.DATA_END:
@@ -176,6 +192,12 @@ class McapFile:
                 log_time = struct.unpack_from("<Q", content, 6)[0]
                 loose.add(position - _RECORD.size - length, position, log_time)
         loose.close()
+        total = sum(segment.body_size for segment in self.segments)
+        if total > allowed_bytes(size, _MAX_TIME, _UNSUSPECTED_TOTAL):
+            raise BagError(
+                f"{self.path}: declares {total} bytes, more than {_LARGEST_RATIO} times its "
+                f"{size} bytes on disk: not a recording, or one of nothing"
+            )
         if self.damaged:
             self.counts = None
 
@@ -198,11 +220,16 @@ class McapFile:
             self.damage(f"{kind.__name__} record at byte {where} is damaged and ignored")
             return None
 
-    def _register(self, record: Schema | Channel | None) -> None:
+    def _register(self, record: Schema | Channel | None, size: int) -> None:
         """Keep the first definition of an id; the specification forbids to change it."""
         if record is None:
             return
         known = self.schemas if isinstance(record, Schema) else self.channels
+        if record.id not in known:
+            self._description_bytes += size
+            if self._description_bytes > _MAX_DESCRIPTIONS_BYTES:
+                self.damage(f"more than {_MAX_DESCRIPTIONS_BYTES} bytes of schemas and channels")
+                return
         if known.setdefault(record.id, record) != record:
             self.damage(f"{type(record).__name__} {record.id} is defined twice; kept the first")
 
@@ -229,8 +256,9 @@ class McapFile:
 
     def _parse(self, body: bytes, segment: Segment) -> Messages:
         unpack, header_size = _RECORD.unpack_from, _RECORD.size
-        offsets, lengths = [], []
-        position, end = 0, len(body)
+        # not lists: a chunk may be nothing but the smallest of messages
+        offsets, lengths = array("q"), array("q")
+        position, end, bad = 0, len(body), 0
         while position + header_size <= end:
             opcode, length = unpack(body, position)
             position += header_size
@@ -243,11 +271,17 @@ class McapFile:
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 kind = Schema if opcode == Opcode.SCHEMA else Channel
                 content = body[position : position + min(length, _MAX_DESCRIPTION_BYTES)]
-                self._register(self._parsed(kind, content, segment.offset))
+                record = self._parsed(kind, content, segment.offset)
+                self._register(record, length)
+                bad += record is None
+            else:
+                bad += 1  # nothing else belongs in a chunk
+            if bad > _MOST_DAMAGE:
+                break
             position += length
         if position != end:
             self.damage(f"records in the chunk at byte {segment.offset} are damaged at their end")
-        offsets = np.array(offsets, dtype=np.int64)
+        offsets, lengths = (np.array(column, dtype=np.int64) for column in (offsets, lengths))
         headers = np.ndarray(max(end - 21, 0), _MESSAGE_HEADER, body, 0, (1,))[offsets]
         log_times = np.minimum(headers["log_time"], _MAX_TIME).astype(np.int64)
         messages = Messages(
@@ -256,7 +290,7 @@ class McapFile:
             log_times,
             np.minimum(headers["publish_time"], _MAX_TIME).astype(np.int64),
             offsets + 22,
-            np.array(lengths, dtype=np.int64) - 22,
+            lengths - 22,
         )
         if (np.diff(log_times) < 0).any():
             messages = messages.select(np.argsort(log_times, kind="stable"))
@@ -304,8 +338,11 @@ class _LooseRun:
 
 
 def _decompressed(data: bytes, segment: Segment) -> bytes:
-    if segment.body_size > MAX_CHUNK_BYTES:
-        raise BagError(f"it declares {segment.body_size} bytes, more than {MAX_CHUNK_BYTES}")
+    most = allowed_bytes(len(data), MAX_CHUNK_BYTES)
+    if segment.body_size > most:
+        raise BagError(
+            f"it declares {segment.body_size} bytes, expected at most {most} of {len(data)} on disk"
+        )
     if not segment.compression:
         body = data
     elif segment.compression == "zstd":

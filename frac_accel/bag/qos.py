@@ -6,9 +6,12 @@ from typing import NamedTuple
 
 import yaml
 
+from frac_accel import safe_yaml
+
 _RELIABILITY = {1: "reliable", 2: "best_effort"}
 _DURABILITY = {1: "transient_local", 2: "volatile"}
 _HISTORY = {1: "keep_last", 2: "keep_all"}
+_MAX_BYTES = 16 * 1024  # of the YAML; about 300 per publisher
 MAX_DEPTH = 1_000_000
 # rmw's "infinite" duration, int64 max in nanoseconds.
 _INFINITE = {"sec": 9223372036, "nsec": 854775807}
@@ -26,7 +29,7 @@ class Qos(NamedTuple):
 def parse_qos(text: str) -> tuple[Qos, ...]:
     """Profiles from ``offered_qos_profiles``, old (numbers) or new (words); () if malformed."""
     try:
-        entries = yaml.safe_load(text) if isinstance(text, str) else text
+        entries = safe_yaml.load(text[:_MAX_BYTES]) if isinstance(text, str) else text
         return tuple(
             Qos(
                 _word(entry.get("reliability"), _RELIABILITY, "reliable"),
@@ -36,7 +39,7 @@ def parse_qos(text: str) -> tuple[Qos, ...]:
             )
             for entry in entries or ()
         )
-    except (yaml.YAMLError, AttributeError, TypeError, ValueError, OverflowError, RecursionError):
+    except (AttributeError, TypeError, ValueError, OverflowError):
         return ()
 
 

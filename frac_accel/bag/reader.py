@@ -17,7 +17,7 @@ import numpy as np
 
 from frac_accel import cdr
 from frac_accel.bag.files import bag_files
-from frac_accel.bag.mcap_file import McapFile, Messages, Segment
+from frac_accel.bag.mcap_file import McapFile, Messages, Segment, allowed_bytes
 from frac_accel.bag.qos import Qos, parse_qos
 from frac_accel.errors import BagError
 from frac_accel.record.samples import Samples
@@ -272,14 +272,15 @@ class BagReader:
         horizons = [(segment.start_ns, segment.order) for segment in waiting[1:]]
         opened: list[tuple[int, tuple[int, int], Messages]] = []  # heap by next log time
         open_bytes, found = 0, False
+        most_bytes = allowed_bytes(sum(file.size for file in self._files), MAX_OPEN_BYTES)
         for segment, (horizon_ns, horizon) in zip(waiting, [*horizons, _END_OF_BAG]):
             messages = self._open(segment, wanted)
             if messages is not None and len(messages.offsets):
                 heappush(opened, (int(messages.log_times_ns[0]), segment.order, messages))
                 open_bytes += len(messages.body)
-            if open_bytes > MAX_OPEN_BYTES:
+            if open_bytes > most_bytes:
                 raise BagError(
-                    f"{self.path}: more than {MAX_OPEN_BYTES >> 20} MiB of chunks overlap in "
+                    f"{self.path}: more than {most_bytes >> 20} MiB of chunks overlap in "
                     "time; sort the bag first (mcap sort)"
                 )
             ready, rest = [], []
@@ -345,6 +346,7 @@ class _Unreadable:
     channels: dict = {}
     warnings: list[str] = []
     damaged = True
+    size = 0
 
 
 def _interleaved(parts: list[Messages]) -> Messages:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +15,7 @@ from frac_accel.bag.mcap_writer import McapWriter
 from frac_accel.bag.qos import Qos, parse_qos, qos_entries, qos_text
 from frac_accel.bag.reader import TopicInfo
 from frac_accel.errors import BagError
+from frac_accel.outputs import stage
 
 _MAX_TIME = 2**63 - 1
 _METADATA_VERSION = 9
@@ -33,10 +33,10 @@ class _Topic(NamedTuple):
 class BagWriter:
     """Writes serialised messages; a context manager.
 
-    Left by an exception, or never closed, an ordinary writer leaves nothing behind: it writes
-    beside the target and renames when it is closed.  With ``in_place`` (a recorder) it writes to
-    the target itself, and all that was written before the last `flush` is readable from then
-    on, whatever happens to the process.
+    Left by an exception, or never closed, an ordinary writer leaves nothing behind: it makes an
+    `frac_accel.outputs.Output`.  With ``in_place`` (a recorder) it writes to the target itself,
+    and all that was written before the last `flush` is readable from then on, whatever happens
+    to the process.
 
     Parameters
     ----------
@@ -58,22 +58,25 @@ class BagWriter:
         self._is_folder = self.path.suffix != ".mcap"
         if self.path.exists() and (self._is_folder or in_place or self.path.is_dir()):
             raise BagError(f"{path}: exists already")
-        # Only the process that writes it may remove it, hence its number in the name.
-        beside = self.path.with_name(f".{self.path.name}.{os.getpid()}.partial")
-        self._target = self.path if in_place else beside
         self._topics: dict[str, _Topic] = {}
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._start_ns, self._end_ns = _MAX_TIME, 0
         self._closed = False
+        self._output = self._stream = None
+        self._target = self.path
         try:
+            if not in_place:
+                self._output = stage(self.path)
+                self._target = self._output.path
             if self._is_folder:
                 self._target.mkdir()
                 file = self._target / f"{self.path.name}_0.mcap"
             else:
                 file = self._target
             self._file_name = file.name if self._is_folder else self.path.name
-            self._stream = open(file, "xb" if in_place else "wb")
+            self._stream = open(file, "xb")
         except OSError as error:
+            self.abort()
             raise BagError(f"{path}: cannot be written: {error.strerror}") from None
         self._writer = self._checked(McapWriter, self._stream, "ros2", "frac_accel")
 
@@ -164,22 +167,19 @@ class BagWriter:
         if self._is_folder:
             text = yaml.safe_dump({"rosbag2_bagfile_information": information}, sort_keys=False)
             self._checked((self._target / METADATA_NAME).write_text, text, "utf-8")
-        if not self._in_place:
-            self._checked(os.replace, self._target, self.path)
+        if self._output:
+            self._checked(self._output.done)
 
     def abort(self) -> None:
         """Give up: nothing is left of a bag that was not written in place."""
         self._closed = True
         try:
-            self._stream.close()
+            if self._stream:
+                self._stream.close()
         except OSError:
             pass  # a full disk is why we are here
-        if self._in_place:
-            return
-        if self._is_folder:
-            shutil.rmtree(self._target, ignore_errors=True)
-        else:
-            self._target.unlink(missing_ok=True)
+        if self._output:
+            self._output.drop()
 
     def _register(
         self,
@@ -248,3 +248,6 @@ class BagWriter:
         except OSError as error:
             self.abort()
             raise BagError(f"{self.path}: cannot be written: {error.strerror}") from None
+        except BaseException:
+            self.abort()
+            raise

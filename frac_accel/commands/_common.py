@@ -13,11 +13,16 @@ from tqdm import tqdm
 
 from ..bag import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC, BagReader
 from ..errors import BagError, FracAccelError
+from ..outputs import guard, write_text
 from ..parameters import plain
 from ..record import Temperature
+from ..regular_file import open_regular
 from ..report import require_plotly
 
 _NUMBERS = re.compile(r"\[([-+.\deEnul,\s]*)\]")
+# Options that name files, of all verbs.
+INPUTS = ("bag", "bags", "model", "result")
+OUTPUTS = ("output", "extended_model", "report", "json")
 
 
 def add_bag(parser):
@@ -117,7 +122,7 @@ def write_json(path, result):
     # a list of numbers is one line, not one for each
     text = _NUMBERS.sub(lambda found: f"[{' '.join(found[1].split())}]", text)
     try:
-        Path(path).write_text(text + "\n", encoding="utf-8")
+        write_text(path, text + "\n")
     except OSError as error:
         raise FracAccelError(f"{path}: cannot write the result: {error.strerror}") from None
 
@@ -130,20 +135,20 @@ def open_bag(path):
     return reader
 
 
-def require_output(path, *inputs):
-    """Refuse an output that is one of the inputs, or that has no folder."""
-    path = Path(path)
-    for source in inputs:
-        if path.exists() and path.resolve() == Path(source).resolve():
-            raise BagError(f"{path}: is the input, expected another file for the output")
-    if not path.absolute().parent.is_dir():
-        raise BagError(f"{path}: the folder {path.absolute().parent} does not exist")
+def guard_files(arguments):
+    """Refuse options whose output is one of the inputs or another output."""
+    guard(_files(arguments, OUTPUTS), _files(arguments, INPUTS))
 
 
-def require_report(path, *inputs):
-    """Refuse a report that could not be written, before the work that it is to tell of."""
+def _files(arguments, options):
+    named = [vars(arguments).get(option) for option in options]
+    return [file for entry in named if entry is not None
+            for file in ([entry] if isinstance(entry, str) else entry)]
+
+
+def require_report(path):
+    """Refuse a report that could not be made, before the work that it is to tell of."""
     if path is not None:
-        require_output(path, *inputs)
         require_plotly()
 
 
@@ -158,6 +163,11 @@ def step(bar, words):
     bar.update()
 
 
+def printable(name):
+    """A name of a file as text that any file of ours can hold."""
+    return name.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def provenance(bag, command):
     """Where a result comes from: the bag, its content's hash, the command and our version."""
     from importlib.metadata import PackageNotFoundError, version
@@ -165,15 +175,15 @@ def provenance(bag, command):
     files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
     digest = hashlib.sha256()
     for file in files:
-        with open(file, "rb") as stream:
+        with open_regular(file) as stream:
             while part := stream.read(1 << 20):
                 digest.update(part)
     try:
         ours = version("frac_accel")
     except PackageNotFoundError:
         ours = "not installed"
-    return {"bag": path.name, "sha256": digest.hexdigest(), "command": command,
-            "frac_accel_version": ours}
+    return {"bag": printable(path.name), "sha256": digest.hexdigest(),
+            "command": printable(command), "frac_accel_version": ours}
 
 
 def _without_nan(value):

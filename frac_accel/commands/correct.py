@@ -22,7 +22,6 @@ from ._common import (
     filter_wishes,
     open_bag,
     progress,
-    require_output,
     write_json,
 )
 
@@ -42,7 +41,6 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
-    require_output(arguments.output, arguments.bag)
     corrector = Corrector(SensorModel.load(arguments.model), **filter_wishes(arguments))
     reader = open_bag(arguments.bag)
     raw = reader.topic(arguments.sensor, cdr.ACCELERATION_TYPES)

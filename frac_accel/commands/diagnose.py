@@ -5,6 +5,7 @@ import sys
 from ..bag import TEMPERATURE_TOPIC, read_temperature
 from ..diagnosis import diagnose
 from ..model import SensorModel
+from ..outputs import say
 from ._common import (
     add_bag,
     add_json,
@@ -14,7 +15,6 @@ from ._common import (
     positive,
     progress,
     provenance,
-    require_output,
     require_report,
     step,
     write_json,
@@ -43,10 +43,7 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
-    inputs = [arguments.bag, *filter(None, [arguments.model])]
-    if arguments.extended_model:
-        require_output(arguments.extended_model, *inputs)
-    require_report(arguments.report, *inputs)
+    require_report(arguments.report)
     model = SensorModel.load(arguments.model) if arguments.model else None
     reader = open_bag(arguments.bag)
     temperature = None
@@ -67,13 +64,13 @@ def run(arguments):
     if arguments.extended_model and found.model is not None:
         found.model.metadata["provenance"] = source
         found.model.save(arguments.extended_model)
-        print(f"{arguments.extended_model}: written")
+        say(f"{arguments.extended_model}: written")
     if arguments.report:
         from ..report.diagnosis import diagnosis_page
         page = diagnosis_page(found, source)
         page.write(arguments.report)
         source = page.provenance
-        print(f"{arguments.report}: written")
+        say(f"{arguments.report}: written")
     write_json(arguments.json, {**found.as_dict(arguments.extended_model), "provenance": source})
 
 

@@ -7,6 +7,7 @@ mean, and whether they agree is said.
 from pathlib import Path
 
 from ..identification import STRUCTURES, identify
+from ..outputs import say
 from ..record import Record
 from ..report.identification import identification_page
 from ._common import (
@@ -14,9 +15,9 @@ from ._common import (
     add_report,
     add_topics,
     open_bag,
+    printable,
     progress,
     provenance,
-    require_output,
     require_report,
     step,
     write_json,
@@ -38,8 +39,7 @@ def add_arguments(parser):
 def run(arguments):
     """Do it."""
     bags = arguments.bags
-    require_output(arguments.output, *bags)
-    require_report(arguments.report, *bags)
+    require_report(arguments.report)
     for bag in bags:
         open_bag(bag)
     pairs = [Record.load(bag, arguments.reference, arguments.sensor, arguments.axis)
@@ -50,13 +50,14 @@ def run(arguments):
     source = _provenance(bags, command)
     with progress(None, unit="step") as bar:
         result = identify(pairs, arguments.axis, arguments.structure, source,
-                          lambda words: step(bar, words), [Path(bag).name for bag in bags])
+                          lambda words: step(bar, words),
+                          [printable(Path(bag).name) for bag in bags])
     result.model.save(arguments.output)
     _print(result, pairs, bags)
-    print(f"{arguments.output}: written")
+    say(f"{arguments.output}: written")
     if arguments.report:
         identification_page(result, pairs[0], arguments.axis, source).write(arguments.report)
-        print(f"{arguments.report}: written")
+        say(f"{arguments.report}: written")
     write_json(arguments.json, result.as_dict())
 
 

@@ -2,13 +2,13 @@
 again, its claims audited, and its experiment done properly on the bench's bags.
 """
 
-from ..paper import PaperResult, reproduce
+from ..outputs import say
+from ..paper import BAGS, PaperResult, reproduce
 from ._common import (
     add_json,
     add_report,
     progress,
     provenance,
-    require_output,
     require_report,
     write_json,
 )
@@ -19,7 +19,7 @@ def add_arguments(parser):
     parser.add_argument("--quick", action="store_true",
                         help="tables, figures and audit only, without the study (seconds instead "
                              "of minutes)")
-    parser.add_argument("--bags", metavar="FOLDER",
+    parser.add_argument("--bags", metavar="FOLDER", default=str(BAGS),
                         help="folder of the study's bags (default: bags/ of the checkout)")
     add_report(parser)
     add_json(parser)
@@ -28,8 +28,6 @@ def add_arguments(parser):
 def run(arguments):
     """Do it."""
     require_report(arguments.report)
-    if arguments.json:
-        require_output(arguments.json)
     with progress(100, unit="%") as bar:
         def show(words, share):
             bar.set_description(words, refresh=False)
@@ -39,7 +37,7 @@ def run(arguments):
     if arguments.report:
         from ..report.paper import paper_page
         paper_page(result, _provenance(arguments, result)).write(arguments.report)
-        print(f"{arguments.report}: written")
+        say(f"{arguments.report}: written")
     write_json(arguments.json, result.as_dict())
 
 

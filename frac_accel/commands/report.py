@@ -4,8 +4,13 @@ import json
 
 from ..diagnosis import Diagnosis
 from ..errors import FracAccelError
+from ..outputs import say
+from ..regular_file import read_text
 from ..report.diagnosis import diagnosis_page
 from ._common import require_report
+
+_LARGEST = 64 * 2**20
+"""Bytes of a result."""
 
 
 def add_arguments(parser):
@@ -16,20 +21,19 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
-    require_report(arguments.output, arguments.result)
+    require_report(arguments.output)
     data = _read(arguments.result)
     try:
         found = Diagnosis.from_dict(data)
     except FracAccelError as error:
         raise FracAccelError(f"{arguments.result}: {error}") from None
     diagnosis_page(found, data.get("provenance")).write(arguments.output)
-    print(f"{arguments.output}: written")
+    say(f"{arguments.output}: written")
 
 
 def _read(path):
     try:
-        with open(path, encoding="utf-8") as file:
-            return json.load(file)
+        return json.loads(read_text(path, _LARGEST))
     except OSError as error:
         raise FracAccelError(f"{path}: cannot read the result: {error.strerror}") from None
     except (ValueError, RecursionError) as error:

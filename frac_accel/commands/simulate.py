@@ -19,7 +19,6 @@ from ._common import (
     open_bag,
     progress,
     read_temperature_at,
-    require_output,
     write_json,
 )
 
@@ -39,7 +38,6 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
-    require_output(arguments.output, arguments.bag)
     model = SensorModel.load(arguments.model)
     reader = open_bag(arguments.bag)
     info = reader.topic(arguments.reference, cdr.ACCELERATION_TYPES)

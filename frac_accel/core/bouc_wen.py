@@ -22,7 +22,8 @@ def follow_one_way(z, change, beta, gamma):
             break
         side = z if z != 0.0 else change
         k = way + (gamma if side > 0 else -gamma)
-        x = -k * change
+        # e^300 takes any variable through zero, and e^710 is none
+        x = min(-k * change, 300.0)
         if abs(x) > 0.05:
             saturation = -math.expm1(x) / k
         else:  # its series, far faster

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from ..errors import DesignError
 from .filter import ParallelFilter
 
 # Lowest frequency [of the sampling rate] that is told from zero: at 2 kHz a period of six days.
@@ -20,6 +21,8 @@ _LONGEST = 8
 # Relative change of a response from that at zero that is none.
 STATIC = 5e-4
 _MOST_TAPS = 4096
+# Sampling rate over the band's upper end; eight times as many taps are needed at least.
+MOST_OVERSAMPLED = 5000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -72,6 +75,10 @@ class FilterProblem:
         self.lead = int(extra_delay)
         self.extra_delay = extra_delay - self.lead
         low, high = band
+        if rate > MOST_OVERSAMPLED * high:
+            raise DesignError(f"a filter that ends at {high:.4g} Hz has no end in sight at "
+                              f"{rate:.6g} Hz; expected a band up to {rate / MOST_OVERSAMPLED:.4g} "
+                              "Hz at least, or fewer samples per second")
         self.poles_s = poles_s
         self.response, self.floor = target, floor
         self.longest = min(_MOST_TAPS // 2,

@@ -121,6 +121,9 @@ def excited_band(reference, sensor, sampling_rate_hz):
     most = np.flatnonzero(medfilt(strong, 5))
     if not len(most):
         most = np.flatnonzero(power > 0.1 * power.max())
+    if not len(most):
+        raise IdentificationError("the reference's power is not a number at any frequency: its "
+                                  "values are too large or too small to be squared")
     # the window smears what is next to zero into it
     low = frequency[most[0]] if most[0] > 2 else 0.0
     return float(low), float(frequency[most[-1]])

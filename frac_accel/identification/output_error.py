@@ -190,6 +190,8 @@ class _Problem:
         edge = min(_EDGE, self.n // 8)
         used = np.ones(self.n, bool) if valid is None else valid.copy()
         used[:edge] = used[-edge:] = False
+        if not used.any():
+            raise IdentificationError("no sample is left in both topics, away from the ends")
         self.used = used
         self.judged = slice(edge, self.n - edge) if used.sum() == self.n - 2 * edge else used
         self.sensor = sensor[self.judged]
@@ -235,6 +237,9 @@ class _Problem:
         """Most promising starting points: the grid's best, improved on the averaged response."""
         bulk = bulk_delay(self.reference, self.whole)
         frequency, response, weight = averaged_response(self.reference, self.whole, self.rate, bulk)
+        if not len(frequency):
+            raise IdentificationError("no frequency is left at which the record says how the "
+                                      "sensor responds")
         s = 2j * np.pi * frequency
         prepared = self.structure.prepare(s)
         peak = frequency[np.argmax(np.abs(response))]

@@ -10,6 +10,8 @@ from ..record import Record
 from .clipped import clipped_reference, clipped_sensor
 from .frequency_response import bulk_delay
 
+# Fewest instants with a sample in both topics, as `make_pair` wants of each.
+_FEWEST_SHARED = 32
 # Difference between two copies of one signal, of its peak: the rounding of 32-bit numbers.
 _SAME = 1e-6
 # Steps of a rounded copy, of its standard deviation, below which a sensor of its own would show.
@@ -76,6 +78,10 @@ def check_record(pair, axis="x"):
         If the sensor's topic is a copy of the reference, one of the topics stands still nearly all
         the time, or too much is clipped.
     """
+    shared = np.count_nonzero(pair.valid)
+    if shared < _FEWEST_SHARED:
+        raise IdentificationError(f"{shared} instant(s) have a sample in both topics, expected at "
+                                  f"least {_FEWEST_SHARED}")
     column = AXES.index(axis)
     reference, sensor = pair.reference[:, column], pair.sensor[:, column]
     _require_no_copy(reference, sensor, pair.valid, pair.step("sensor", column))
@@ -114,6 +120,8 @@ def _require_no_copy(reference, sensor, valid, lattice):
     n = len(sensor) - abs(delay)
     first, second = (slice(start, start + n) for start in (max(-delay, 0), max(delay, 0)))
     both = valid[first] & valid[second]
+    if not both.any():
+        return
     x, y = reference[first][both], sensor[second][both]
     x, middle = x - x.mean(), y - y.mean()
     power = x @ x

@@ -5,11 +5,15 @@ other numbers are computed.
 """
 
 import dataclasses
+from pathlib import Path
 
 from . import curves, models, tables
 from .claims import STATUSES, Claim, audit
 
-__all__ = ["STATUSES", "Claim", "PaperResult", "reproduce"]
+__all__ = ["BAGS", "STATUSES", "Claim", "PaperResult", "reproduce"]
+
+# Where the study's bags are in a checkout.
+BAGS = Path(__file__).resolve().parents[2] / "bags"
 
 # Where a column is one of these its cells are ours, otherwise the paper's.
 _OURS = (tables.REPRODUCED, tables.FOLLOWS, tables.NOT_IN_PAPER)

@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 from string import Template
 
-from ..atomic_file import write_text
 from ..errors import FracAccelError
+from ..outputs import write_text
 
 _TEMPLATE = Path(__file__).with_name("page.html")
 # A page with more sections than this has a table of contents.

@@ -9,13 +9,12 @@ from ...diagnosis import diagnose
 from ...errors import BagError, IdentificationError
 from ...identification import identify
 from ...record import Record
-from .. import published
+from .. import BAGS, published
 from ..tables import errors_percent
 from .candidates import fit_all
 from .judge import Sines, judge, rms
 from .sweep import best, damping_orders, sweep, table_4
 
-BAGS = Path(__file__).resolve().parents[3] / "bags"
 # The sensors of the bench, and those whose orders are swept.
 SENSORS = {"classical": "classical sensor, damping order 1",
            "fractional": "fractional sensor, damping order 0.6",

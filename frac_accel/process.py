@@ -1,0 +1,112 @@
+"""What a command is for other processes: how it ends when told to, and what it says on its way."""
+
+import contextlib
+import os
+import platform
+import shlex
+import signal
+import sys
+import tempfile
+import threading
+import traceback
+
+
+class Stopped(BaseException):
+    """A signal asked the process to end; ``signal`` is its number."""
+
+    def __init__(self, number):
+        super().__init__(number)
+        self.signal = signal.Signals(number)
+
+
+@contextlib.contextmanager
+def stopping_cleanly():
+    """SIGTERM and SIGHUP raise `Stopped`, once, so that what is half done is cleaned up.
+
+    A signal that the process was started to ignore (``nohup``) stays ignored.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    numbers = [number for number in (signal.SIGTERM, signal.SIGHUP)
+               if signal.getsignal(number) == signal.SIG_DFL]
+
+    def stop(number, frame):
+        for each in numbers:
+            signal.signal(each, signal.SIG_IGN)
+        raise Stopped(number)
+
+    for number in numbers:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number in numbers:
+            signal.signal(number, signal.SIG_DFL)
+
+
+@contextlib.contextmanager
+def tolerant_output():
+    """Names that are not UTF-8 are printed with escapes; a reader who has gone is no error."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(AttributeError, ValueError):
+            stream.reconfigure(errors="backslashreplace")
+    with contextlib.redirect_stdout(_Output(sys.stdout)):
+        yield
+
+
+class _Output:
+    """Standard output, until its reader has seen enough."""
+
+    def __init__(self, stream):
+        self._stream = stream
+
+    def __getattr__(self, name):
+        return getattr(self._stream, name)
+
+    def write(self, text):
+        """Write text, if somebody reads it."""
+        self._tolerating(self._stream.write, text)
+        return len(text)
+
+    def flush(self):
+        """Hand on what was written."""
+        self._tolerating(self._stream.flush)
+
+    def _tolerating(self, function, *arguments):
+        try:
+            function(*arguments)
+        except OSError as error:
+            # what is still buffered goes nowhere, also at the interpreter's end
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())
+            os.close(nowhere)
+            if not isinstance(error, BrokenPipeError):
+                raise
+
+
+def write_details(error, arguments):
+    """Write what is known of an unforeseen error to a file in the folder for temporary files.
+
+    Parameters
+    ----------
+    error : BaseException
+    arguments : list of str
+        Of the command.
+
+    Returns
+    -------
+    str
+        Name of the file, or why there is none.
+    """
+    text = "".join([
+        f"frac_accel {shlex.join(arguments)}\n",
+        f"Python {platform.python_version()} on {platform.platform()}\n",
+        *traceback.format_exception(error)])
+    try:
+        descriptor, path = tempfile.mkstemp(prefix="frac_accel-error-", suffix=".txt")
+        with open(descriptor, "w", encoding="utf-8", errors="backslashreplace") as file:
+            file.write(text)
+    except OSError as trouble:
+        return f"nowhere ({trouble.strerror})"
+    return path
