@@ -178,6 +178,12 @@ class SensorModel:
         return float(self.metadata.get("noise_std", 0.0))
 
     @property
+    def plausible_range(self):
+        """Lowest and highest output that can be true, or None where the model does not say."""
+        pair = self.metadata.get("plausible_range")
+        return pair and tuple(float(edge) for edge in pair)
+
+    @property
     def band_hz(self):
         """Lowest and highest frequency [Hz] for which the model was identified, or None."""
         return self.metadata.get("band_hz")
@@ -282,6 +288,9 @@ class SensorModel:
             raise ModelError(f"noise_std: {data['noise_std']} given, expected at least 0")
         if "band_hz" in data:
             _require_band(data["band_hz"])
+        if "plausible_range" in data:
+            _require_pair(data["plausible_range"], "plausible_range",
+                          "two numbers in output units, ascending", -np.inf)
         metadata = {key: plain(data[key]) for key in data if key not in _OWN_KEYS}
         faults = _effects(data.get("reference_faults"), "reference_faults")
         return cls(core, effects, axes, metadata, faults)
@@ -409,12 +418,15 @@ def _require_known_keys(data):
 
 
 def _require_band(band):
-    expected = "two numbers in Hz, at least 0 and ascending"
-    if not isinstance(band, list) or len(band) != 2:
-        raise ModelError(f"band_hz: {band!r:.60} given, expected {expected}")
-    low, high = (number(edge, f"band_hz[{i}]", expected) for i, edge in enumerate(band))
-    if not 0 <= low < high:
-        raise ModelError(f"band_hz: {band!r} given, expected {expected}")
+    _require_pair(band, "band_hz", "two numbers in Hz, at least 0 and ascending", 0.0)
+
+
+def _require_pair(pair, where, expected, least):
+    if not isinstance(pair, list) or len(pair) != 2:
+        raise ModelError(f"{where}: {pair!r:.60} given, expected {expected}")
+    low, high = (number(edge, f"{where}[{i}]", expected) for i, edge in enumerate(pair))
+    if not least <= low < high:
+        raise ModelError(f"{where}: {pair!r} given, expected {expected}")
 
 
 def _core(entry, where):
