@@ -3,7 +3,10 @@
 import dataclasses
 import difflib
 import functools
+import hashlib
 import math
+import os
+import stat
 
 import numpy as np
 import yaml
@@ -18,7 +21,10 @@ from .parameters import as_mapping, build, number, parameter_fields, plain
 SCHEMA = "frac_accel/sensor_model/1"
 AXES = "xyz"
 _OWN_KEYS = ("schema", "core", "effects", "axes", "reference_faults")
-_LARGEST_FILE = 10_000_000
+# A model is a few kilobytes; YAML takes seconds to read a megabyte.
+_LARGEST_FILE = 64 * 1024
+# Digits of the longest whole number that means anything here.
+_MOST_DIGITS = 40
 
 
 @dataclasses.dataclass(frozen=True)
@@ -313,24 +319,28 @@ class SensorModel:
         ModelError
             Naming the file, the field, its value and what was expected.
         """
+        return cls.load_with_hash(path)[0]
+
+    @classmethod
+    def load_with_hash(cls, path):
+        """Model from a YAML file, and the SHA-256 of what was read; raises as `load`."""
+        data = _read(path)
         try:
-            with open(path, encoding="utf-8") as file:
-                text = file.read(_LARGEST_FILE + 1)
-        except (OSError, ValueError) as error:
-            reason = ("not a text file" if isinstance(error, UnicodeDecodeError)
-                      else getattr(error, "strerror", None) or error)
-            raise ModelError(f"{path}: cannot read the model: {reason}") from None
-        if len(text) > _LARGEST_FILE:
-            raise ModelError(f"{path}: larger than {_LARGEST_FILE // 1_000_000} MB, "
-                             "expected a sensor model")
-        try:
-            data = yaml.load(text, Loader=_Loader)
-        except (yaml.YAMLError, RecursionError, ValueError) as error:
+            content = yaml.load(data.decode(), Loader=_Loader)
+        except UnicodeDecodeError:
+            raise ModelError(f"{path}: cannot read the model: not a text file") from None
+        except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:
             mark = getattr(error, "problem_mark", None)
             line = f", line {mark.line + 1}" if mark else ""
             problem = getattr(error, "problem", None) or type(error).__name__
             raise ModelError(f"{path}{line}: not valid YAML: {problem}") from None
-        return cls.from_dict(data, where=str(path))
+        try:
+            return cls.from_dict(content, where=str(path)), hashlib.sha256(data).hexdigest()
+        except ModelError:
+            raise
+        except Exception as error:  # whatever stands in a file, it is a refusal
+            raise ModelError(f"{path}: cannot be understood as a sensor model: "
+                             f"{type(error).__name__}") from error
 
     def save(self, path):
         """Write the model as YAML; the file is complete or not there."""
@@ -345,6 +355,28 @@ def _applied(stages, values, circumstances):
     for cause, by_axis in stages:
         values = cause.simulate_axes(values, by_axis, circumstances)
     return values
+
+
+def _read(path):
+    """Bytes of a model file: a regular one, of `_LARGEST_FILE` at most; nothing is waited for."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+        try:
+            mode = os.fstat(descriptor).st_mode
+            if not stat.S_ISREG(mode):
+                kind = "a directory" if stat.S_ISDIR(mode) else "not a regular file"
+                raise ModelError(f"{path}: cannot read the model: it is {kind}")
+            data = b""
+            while part := os.read(descriptor, _LARGEST_FILE + 1 - len(data)):
+                data += part
+        finally:
+            os.close(descriptor)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ModelError(f"{path}: cannot read the model: {reason}") from None
+    if len(data) > _LARGEST_FILE:
+        raise ModelError(f"{path}: larger than {_LARGEST_FILE // 1024} KB, expected a sensor model")
+    return data
 
 
 def _removed(stages, values, variance, circumstances):
@@ -373,6 +405,22 @@ class _Loader(yaml.SafeLoader):
                                               event.start_mark)
         return super().compose_node(parent, index)
 
+    def construct_yaml_int(self, node):
+        self._require_short(node)
+        return super().construct_yaml_int(node)
+
+    def construct_yaml_float(self, node):
+        self._require_short(node)
+        return super().construct_yaml_float(node)
+
+    @staticmethod
+    def _require_short(node):
+        """Numbers to the base 60 and those of thousands of digits take minutes, and mean nothing."""
+        if ":" in node.value or len(node.value) > _MOST_DIGITS:
+            raise yaml.constructor.ConstructorError(
+                None, None, f"a number with colons or of more than {_MOST_DIGITS} digits",
+                node.start_mark)
+
     def construct_mapping(self, node, deep=False):
         seen = set()
         for key, _ in node.value:
@@ -387,6 +435,14 @@ class _Loader(yaml.SafeLoader):
 
 
 def is_link(effect):
+
+
+for _tag in ("int", "float"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}",
+                            getattr(_Loader, f"construct_yaml_{_tag}"))
+
+
+def _is_link(effect):
     """Whether an effect is a linear link (the base class's response is one throughout)."""
     return type(effect).transfer_function is not Effect.transfer_function
 

@@ -260,6 +260,10 @@ TEXTS = {
     "mapping as key": ("? {a: 1}\n: 3\n", "not valid YAML"),
     "control character": ("a: \x07", "not valid YAML"),
     "impossible date": ("a: 2024-99-99", "not valid YAML"),
+    "base 60": (f"schema: {SCHEMA}\nnoise_std: " + "1:" * 20_000 + "1", "number with colons"),
+    "base 60, broken": ("a: 1:30.5", "number with colons"),
+    "huge hexadecimal": (f"schema: {SCHEMA}\nseed: 0x" + "f" * 6000, "more than 40 digits"),
+    "huge decimal": ("a: " + "9" * 60_000, "more than 40 digits"),
     "empty": ("", "nothing given"),
     "only a comment": ("# nothing\n", "nothing given"),
 }
@@ -289,8 +293,13 @@ def test_files_that_are_none(tmp_path):
     huge = tmp_path / "huge.yaml"
     with open(huge, "wb") as file:
         file.truncate(50_000_000)
-    with pytest.raises(ModelError, match="larger than 10 MB"):
+    with pytest.raises(ModelError, match="larger than 64 KB"):
         SensorModel.load(huge)
+    fifo = tmp_path / "fifo.yaml"
+    os.mkfifo(fifo)
+    for special in (fifo, "/dev/zero", "/dev/null"):
+        with pytest.raises(ModelError, match="not a regular file"):
+            SensorModel.load(special)
     with pytest.raises(ModelError, match="null byte"):
         SensorModel.load(str(tmp_path / "a\0b"))
 

@@ -183,8 +183,13 @@ class FilteredTopic:
         self._past_counters, self._stream_counters = past, {**past, "waiting": 0}
         self.messages = None
 
-    def prepare(self, model, wishes):
-        """Design another model's filter while this one goes on; raises FracAccelError."""
+    @property
+    def rate_hz(self):
+        """Sampling rate [Hz] that a filter is needed for now; None where it is not known."""
+        return self.stream.sample_rate_hz if self._settled else None
+
+    def prepare(self, model, wishes, design=None):
+        """Make another model's filter, of this design if there is one; raises FracAccelError."""
         self._finish_task()
         self._candidate = None
         if self.messages is None and self._is_optional:
@@ -195,10 +200,9 @@ class FilteredTopic:
             if self.messages is None:
                 design = self._worker.submit(self._make, model, wishes)
             else:
-                design = self._worker.submit(self.stream.prepare, model, **wishes)
+                design = self._worker.submit(self.stream.prepare, model, design, **wishes)
             while not design.done():
-                self._subscription.drain()
-                time.sleep(_POLL_S)
+                self.take_in()
             self._candidate = design.result()
         finally:
             self._hold = False
@@ -212,6 +216,11 @@ class FilteredTopic:
             self._publish(self.messages.replace(model, wishes))
         self._advance()
 
+    def take_in(self):
+        """Take what has come, and wait a little: for whoever waits in the executor's thread."""
+        self._subscription.drain()
+        time.sleep(_POLL_S)
+
     def drain(self):
         """Filter what is waiting."""
         self._subscription.drain()
@@ -222,8 +231,7 @@ class FilteredTopic:
             if self._task.done():
                 self._collect()
             else:
-                self._subscription.drain()
-                time.sleep(_POLL_S)
+                self.take_in()
 
     def _on_messages(self, batch):
         self._intake += batch
@@ -280,12 +288,13 @@ class FilteredTopic:
         task, self._task = self._task, None
         try:
             result = task.result()
-        except FracAccelError as error:
-            self.failure = str(error)
+        except Exception as error:  # a model must not end the node
+            self.failure = (str(error) if isinstance(error, FracAccelError)
+                            else f"{type(error).__name__} in the design")
             if self.messages is not None:
                 self.unfiltered += self.stream.counters["waiting"]
                 self.messages = None
-            self._node.get_logger().error(f"{self.name}: {error}")
+            self._node.get_logger().error(f"{self.name}: {self.failure}")
             return
         if self.messages is None:
             self._use(result)

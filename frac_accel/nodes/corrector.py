@@ -1,10 +1,8 @@
 """Node ``corrector``: raw acceleration in, corrected acceleration with a covariance out."""
 
 import gc
-import hashlib
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
@@ -14,6 +12,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from frac_accel import cdr, correction, health
+from frac_accel.correction.apart import design_apart
 from frac_accel.errors import FracAccelError
 from frac_accel.live_messages import BlockMessages, SampleMessages
 from frac_accel.live_metrics import Findings, LiveMetrics, Window, evaluate
@@ -46,9 +45,10 @@ class Corrector(FracAccelNode):
         self._declare_parameters()
         self.worker = ThreadPoolExecutor(1, "design")
         self._judge = ThreadPoolExecutor(1, "metrics")
+        self._loader = ThreadPoolExecutor(1, "load")
         model, self.model_hash = None, ""
         if self.value("model_file"):
-            model, self.model_hash = _load(self.value("model_file"))
+            model, self.model_hash = SensorModel.load_with_hash(self.value("model_file"))
         depth = self.value("depth")
         type_name = self.value("message_type")
         sample_class = import_message_class(type_name)
@@ -93,11 +93,16 @@ class Corrector(FracAccelNode):
             if channel is self._samples or counters.get("samples"):
                 counts = ", ".join(f"{name} {count}" for name, count in counters.items() if count)
                 print(f"{channel.topic.name}: {counts or 'nothing received'}", flush=True)
-        for worker in (self.worker, self._judge):
+        for worker in (self.worker, self._judge, self._loader):
             worker.shutdown()
 
     def _declare_parameters(self):
         self.declare("model_file", "", "sensor model (YAML) to correct with", read_only=False)
+        self.declare("allow_model_changes", True,
+                     "whether model_file and the wishes for the filter may change while it runs")
+        self.declare("design_deadline_s", 10.0,
+                     "longest time that loading another model and designing its filter may take",
+                     minimum=0.5, maximum=600.0)
         self.declare("sample_rate_hz", 0.0,
                      "sampling rate of the sensor; 0: estimated from the first hundred stamps",
                      minimum=0.0, maximum=1e8)
@@ -153,30 +158,47 @@ class Corrector(FracAccelNode):
         if not model_file:
             return SetParametersResult(successful=False, reason="model_file: empty, expected the "
                                                                 "name of a sensor model")
-        try:
-            self._exchange(model_file, self._wishes(changed))
-        except FracAccelError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+        reason = self._refusal(model_file, self._wishes(changed))
+        return SetParametersResult(successful=not reason, reason=reason)
 
     def _on_reload(self, _, response):
-        try:
-            if not self.value("model_file"):
-                raise NodeError("no model to reload: set the parameter model_file")
-            self._exchange(self.value("model_file"), self._wishes())
-            response.success, response.message = True, f"{self.value('model_file')} is in use"
-        except FracAccelError as error:
-            response.success, response.message = False, str(error)
+        model_file = self.value("model_file")
+        reason = (self._refusal(model_file, self._wishes()) if model_file else
+                  "no model to reload: set the parameter model_file")
+        response.success, response.message = not reason, reason or f"{model_file} is in use"
         return response
+
+    def _refusal(self, model_file, wishes):
+        """Go on with a model and wishes; or why not, with nothing changed."""
+        if not self.value("allow_model_changes"):
+            return "allow_model_changes is false: the model stays as it was at the start"
+        try:
+            self._exchange(model_file, wishes)
+        except FracAccelError as error:
+            return str(error)
+        except Exception as error:  # a model must not end the node
+            self.get_logger().error(f"{model_file}: {type(error).__name__}: {error}")
+            return f"{model_file}: cannot be used: {type(error).__name__}"
+        return ""
 
     def _exchange(self, model_file, wishes):
         """Go on with a model and wishes; where they are bad, raise and change nothing."""
-        model, model_hash = _load(model_file)
-        for channel in self._channels:
-            channel.topic.prepare(model, wishes)
+        topics = [channel.topic for channel in self._channels]
+        rates = {topic.rate_hz or self.value("sample_rate_hz") or None for topic in topics} - {None}
+        # in a process of its own: this one must not wait for it
+        attempt = self._loader.submit(design_apart, model_file, rates, wishes,
+                                      self.value("design_deadline_s"))
+        while not attempt.done():
+            for topic in topics:
+                topic.take_in()
+            if time.monotonic() - self._tick_s > _PERIOD_S:
+                self._tick()
+        model, model_hash, designs = attempt.result()
+        for topic in topics:
+            topic.prepare(model, wishes, designs.get(topic.rate_hz))
         self.model_hash = model_hash
-        for channel in self._channels:
-            channel.topic.replace(model, wishes)
+        for topic in topics:
+            topic.replace(model, wishes)
         self.get_logger().info(f"{model_file} (sha256 {model_hash}) is in use")
 
     def _on_reference(self, batch):
@@ -344,12 +366,6 @@ class _Channel:
                 name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
                 result.append(f"{name} ({reason.strip().rstrip(';')})")
         return tuple(result)
-
-
-def _load(model_file):
-    """Model of a file, and the file's hash."""
-    model = SensorModel.load(model_file)
-    return model, hashlib.sha256(Path(model_file).read_bytes()).hexdigest()
 
 
 def _in_short(design):
