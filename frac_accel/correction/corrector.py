@@ -86,6 +86,9 @@ class Corrector(Stream):
         gain = np.array([reference_gain(axis, model.band_hz) for axis in model.axes])
         return stated_range(self._plausible_range or model.plausible_range, model.limits, gain)
 
+    def _limits(self):
+        return self._model.limits
+
     def _errors_before(self, members, values, index, stamps_ns):
         if not self._has_effects:
             return members

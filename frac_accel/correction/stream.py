@@ -9,12 +9,16 @@ from ..effects import Circumstances
 from ..errors import DesignError, FracAccelError
 from .bridging import BridgeEnsemble
 from .filter import FilterState, ParallelFilter, UnknownHistory
+from .monitors import AxisMonitors
 from .parameter_uncertainty import ParameterUncertaintyState
 from .plausibility import Plausibility, stated_range
 from .static_terms import StaticTermsState
 from .temperature import HeldTemperature
 from .timing import LARGEST, RATE_SAMPLES, SampleClock, estimate_rate, tells_rate
 
+# Variance of a faulty axis [output units squared]: no fusion filter gives it any weight.
+DISTRUSTED = 1e9
+ON_FAULT = ("covariance", "drop", "report")
 # Samples kept for a change of model: the new filter starts with these behind it.
 HISTORY = 4096
 # Most samples that are held while their stamps do not advance.
@@ -65,6 +69,11 @@ class Stream:
         variance.
     plausible_range : sequence of two floats, optional
         Lowest and highest value that can be true; default: see `plausibility`.
+    on_fault : {"covariance", "drop", "report"}
+        What happens to the output while an axis is faulty (`monitors`): its variance becomes
+        `DISTRUSTED`, nothing is given out, or nothing happens.
+    largest_rate : float
+        Largest rate of change [input units/s] that is no fault; 0: any.
     **wishes
         Passed on to `_design`.
 
@@ -75,21 +84,30 @@ class Stream:
     What happens to stamps that scatter, repeat, go back or leave gaps stands in `timing`.
     `counters` says how many samples met which fate; always ``samples`` = ``given`` +
     ``waiting`` + ``warm_up`` + ``cut_off`` + ``duplicates`` + ``stamps_back`` + ``early`` +
-    ``not_finite`` + ``implausible`` + ``without_rate``.
+    ``not_finite`` + ``implausible`` + ``without_rate`` + ``faulty``. Those given while an axis
+    was distrusted are ``distrusted``.
     """
 
-    def __init__(self, model, sample_rate_hz=0.0, noise_std=None, plausible_range=None, **wishes):
+    # Whether the axes are watched; what drives a simulation may stand still.
+    _is_watched = True
+
+    def __init__(self, model, sample_rate_hz=0.0, noise_std=None, plausible_range=None,
+                 on_fault="covariance", largest_rate=0.0, **wishes):
         if not np.isfinite(sample_rate_hz) or sample_rate_hz < 0:
             raise FracAccelError(f"sample_rate_hz: {sample_rate_hz} given, expected a number above "
                                  "0, or 0 to estimate it from the stamps")
         self._wishes = wishes
         self._adopt(model)
         self._noise_std = noise_std
+        if on_fault not in ON_FAULT:
+            raise FracAccelError(f"on_fault: {on_fault!r} given, expected one of "
+                                 f"{', '.join(ON_FAULT)}")
+        self._on_fault, self._largest_rate = on_fault, largest_rate
         self._plausible_range = _range_of(plausible_range)
         self._held, self._held_count, self._advancing = [], 0, False
         self._samples = 0
         self._totals = dict.fromkeys(("given", "warm_up", "cut_off", "duplicates",
-                                      "without_rate"), 0)
+                                      "without_rate", "faulty", "distrusted"), 0)
         self._temperature = HeldTemperature()
         self._record_start_ns = self._record_end_ns = None
         self._clock = None
@@ -107,6 +125,11 @@ class Stream:
     def sample_rate_hz(self):
         """Sampling rate [Hz]; None while it is being estimated."""
         return self.design.sampling_rate_hz if self.design else None
+
+    @property
+    def faults(self):
+        """What is wrong with each axis now, tuple of str: see `monitors.FAULTS`."""
+        return self._monitors.faults if self._clock else ("",) * 3
 
     @property
     def counters(self):
@@ -281,8 +304,11 @@ class Stream:
 
     def _stated_range(self):
         """What `stated_range` says of this stream's input."""
-        return stated_range(self._plausible_range, (np.full(3, -np.inf), np.full(3, np.inf)),
-                            np.ones(3))
+        return stated_range(self._plausible_range, self._limits(), np.ones(3))
+
+    def _limits(self):
+        """Lowest and highest value that each axis of the input can say, shape (3,) each."""
+        return np.full(3, -np.inf), np.full(3, np.inf)
 
     def _errors_before(self, members, values, index, stamps_ns):
         """Ensemble of errors (m, 3, k) of samples (m, 3), after what `_before` does to these."""
@@ -359,11 +385,15 @@ class Stream:
             self._clock.longest_gap = design.warm_up_samples
         noise = self._model.noise_std if self._noise_std is None else self._noise_std
         self._noise_variance = np.broadcast_to(np.square(np.asarray(noise, float)), 3)
+        noise_std = np.sqrt(self._noise_variance)
         if self._clock:
+            self._monitors.set_limits(self._limits(), noise_std)
             self._clock.noise_variance = self._noise_variance
             self._plausibility.set_range(*self._stated_range())
         else:
             self._plausibility = Plausibility(*self._stated_range())
+            self._monitors = AxisMonitors(design.sampling_rate_hz, self._limits(), noise_std,
+                                          self._largest_rate)
 
     def _begin(self):
         """Nothing is known of the motion before the next sample."""
@@ -373,6 +403,8 @@ class Stream:
         self._waiting_stamps = np.empty(0, np.int64)
 
     def _filter(self, *samples):
+        if self._is_watched:
+            self._monitors.add(samples[0], samples[2])
         return self._filter_decided(*self._plausibility.judge(*samples))
 
     def _nothing_more(self):
@@ -528,8 +560,23 @@ class Stream:
             result, spread = result[given], spread[given]
         if len(index):
             self._last_given = int(index[-1])
+            codes = self._monitors.codes(index + self.design.delay_samples)
+            if codes is not None and codes.any() and self._on_fault != "report":
+                index, stamps, result, spread = self._distrust(codes > 0, index, stamps, result,
+                                                               spread)
         self._totals["given"] += len(index)
         return Filtered(index, self._stamps(stamps), *self._after(result, spread, index, stamps))
+
+    def _distrust(self, is_faulty, index, stamps, result, spread):
+        """Samples of which some axes are faulty, as `on_fault` wants them."""
+        rows = is_faulty.any(axis=1)
+        if self._on_fault == "drop":
+            self._totals["faulty"] += int(rows.sum())
+            return index[~rows], stamps[~rows], result[~rows], spread[~rows]
+        self._totals["distrusted"] += int(rows.sum())
+        # a message cannot say that one axis is bad and another's noise unknown
+        unknown = rows[:, None] & np.isnan(spread)
+        return index, stamps, result, np.where(is_faulty | unknown, DISTRUSTED, spread)
 
 
 def _range_of(plausible_range):
