@@ -415,7 +415,7 @@ class _Loader(yaml.SafeLoader):
 
     @staticmethod
     def _require_short(node):
-        """Numbers to the base 60 and those of thousands of digits take minutes, and mean nothing."""
+        """Numbers to the base 60 or of thousands of digits take minutes, and mean nothing."""
         if ":" in node.value or len(node.value) > _MOST_DIGITS:
             raise yaml.constructor.ConstructorError(
                 None, None, f"a number with colons or of more than {_MOST_DIGITS} digits",

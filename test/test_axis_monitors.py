@@ -1,4 +1,4 @@
-"""A faulty axis is noticed in stated time, said, and no longer trusted; a quiet one is left alone."""
+"""A faulty axis is noticed, said and no longer trusted; a quiet one is left alone."""
 
 import numpy as np
 import pytest

@@ -48,7 +48,8 @@ def test_the_design_is_the_same_to_the_last_bit(path):
     "core: {natural_frequency_hz: 1, damping_ratio: 0.1}\n"
     "effects: [{cause: hysteresis, strength: 1e200, beta: 1e200, gamma: -1e200}]",
     "core: {natural_frequency_hz: 150, damping_ratio: 0.1}\n"
-    "effects: [{cause: cubic_stiffness, alpha3: 1e308}, {cause: quadratic_stiffness, alpha2: 1e308}]",
+    "effects: [{cause: cubic_stiffness, alpha3: 1e308}, "
+    "{cause: quadratic_stiffness, alpha2: 1e308}]",
     "core: {type: arx, numerator: [1e300, -1e300], denominator: [1, 0.5], sampling_rate_hz: 1}",
     "noise_std: 0x" + "f" * 6000,
     "[" * 60_000,

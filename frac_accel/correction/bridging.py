@@ -2,9 +2,9 @@ r"""What a bridged gap leaves open: how far the missing samples may be from the 
 
 The record itself says it: laid over the last `HISTORY` samples, the same bridge is wrong by errors
 whose covariance is found from all places where its ends and the samples between are there (each
-pair of them for itself, as others may be lost). Where there are too few such places, the covariance
-follows from the structure function :math:`D(\tau) = E (x_{t+\tau} - x_t)^2` (N. Cressie, *Statistics
-for Spatial Data*, 1993, section 3.2):
+pair of them for itself, as others may be lost). Where there are too few such places, the
+covariance follows from the structure function :math:`D(\tau) = E (x_{t+\tau} - x_t)^2`
+(N. Cressie, *Statistics for Spatial Data*, 1993, section 3.2):
 
 .. math:: Cov(e_k, e_l) = -\tfrac12 \sum_{ij} \lambda_{ki} \lambda_{lj} D(t_i - t_j)
 

@@ -1,7 +1,7 @@
 """Axes that no longer measure: dead, stuck, saturated, held, or faster than the sensor can be.
 
-What an axis says is looked at in frames of `FRAME_S`. A verdict holds from the end of the frame that
-makes it, so what is decided depends on the samples and their order alone. The rules:
+What an axis says is looked at in frames of `FRAME_S`. A verdict holds from the end of the frame
+that makes it, so what is decided depends on the samples and their order alone. The rules:
 
 * *still*: an axis whose samples stay within a thousandth of the noise's deviation (or are all the
   same), or within a millionth of what another axis moves. Samples of a coarse quantiser are the

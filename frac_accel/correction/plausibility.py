@@ -31,7 +31,7 @@ WIDER, RESTLESS, FASTER, TAIL = 8.0, 2.0, 4.0, 128
 FLOOR = 1.0
 LOOK, ALONE = 8, 4
 LEARN = 32
-# Samples among which these are looked for: behind a suspect, or at the start, there may be bad ones.
+# Samples among which these are looked for, as there may be bad ones between them.
 HOLD = 256
 # Of the first samples, those that do not count for the first range: the largest of each axis.
 _LEFT_OUT = 6

@@ -13,11 +13,17 @@ from std_srvs.srv import Trigger
 
 from frac_accel import cdr, correction, health
 from frac_accel.correction.apart import design_apart
+from frac_accel.correction.stream import ON_FAULT
 from frac_accel.errors import FracAccelError
 from frac_accel.live_messages import BlockMessages, SampleMessages
 from frac_accel.live_metrics import Findings, LiveMetrics, Window, evaluate
 from frac_accel.model import SensorModel
-from frac_accel.nodes._filtered_topic import FilteredTopic, raw_qos, subscribe_temperature
+from frac_accel.nodes._filtered_topic import (
+    ON_TWO_PUBLISHERS,
+    FilteredTopic,
+    raw_qos,
+    subscribe_temperature,
+)
 from frac_accel.nodes._runtime import (
     FracAccelNode,
     NodeError,
@@ -103,6 +109,28 @@ class Corrector(FracAccelNode):
         self.declare("design_deadline_s", 10.0,
                      "longest time that loading another model and designing its filter may take",
                      minimum=0.5, maximum=600.0)
+        self.declare("plausible_range", [0.0, 0.0],
+                     "lowest and highest raw value that can be true; both 0: the model's range, "
+                     "or what the record itself says")
+        on_fault = self.declare("on_fault", "covariance",
+                                "output while an axis is dead, stuck, saturated or held: "
+                                "covariance (one that nothing trusts), drop (none) or report (as "
+                                "ever)")
+        others = self.declare("on_two_publishers", "first",
+                              "raw topic with two publishers: first (the other is dropped) or none")
+        for name, value, words in (("on_fault", on_fault, ON_FAULT),
+                                   ("on_two_publishers", others, ON_TWO_PUBLISHERS)):
+            if value not in words:
+                raise NodeError(f"parameter '{name}' must be {' or '.join(words)}, got {value!r}")
+        if len(self.value("plausible_range")) != 2:
+            raise NodeError("parameter 'plausible_range' must be two numbers, got "
+                            f"{list(self.value('plausible_range'))}")
+        self.declare("largest_rate", 0.0,
+                     "largest rate of change of the raw signal that is no fault [1/s]; 0: any",
+                     minimum=0.0, maximum=1e15)
+        self.declare("stale_after_s", 0.5,
+                     "time without a corrected sample after which the output counts as stale",
+                     minimum=0.01, maximum=3600.0)
         self.declare("sample_rate_hz", 0.0,
                      "sampling rate of the sensor; 0: estimated from the first hundred stamps",
                      minimum=0.0, maximum=1e8)
@@ -147,8 +175,11 @@ class Corrector(FracAccelNode):
 
     def make_stream(self, model, wishes):
         """Stream of one topic."""
-        return correction.Corrector(model, self.value("sample_rate_hz"),
-                                    noise_std=self.value("noise_std") or None, **wishes)
+        stated = tuple(self.value("plausible_range"))
+        return correction.Corrector(
+            model, self.value("sample_rate_hz"), noise_std=self.value("noise_std") or None,
+            plausible_range=stated if any(stated) else None, on_fault=self.value("on_fault"),
+            largest_rate=self.value("largest_rate"), **wishes)
 
     def _on_parameters(self, parameters):
         changed = {p.name: p.value for p in parameters if p.name in _DESIGN_PARAMETERS}
@@ -253,11 +284,12 @@ class _Channel:
         self._findings = Findings()
         self._counters = {}
         self._newest_stamp_ns = None
+        self._alone = ()
         self._other_rate_periods = 0
         self.topic = FilteredTopic(
             node, message_class, topics, node.value("depth"), node.worker,
             lambda model, wishes: make_messages(node.make_stream(model, wishes)), is_optional,
-            self._on_processed)
+            self._on_processed, node.value("on_two_publishers"))
 
     def _on_processed(self, processed, now_ns):
         self._metrics.add(processed.raw, processed.stamps_ns, processed.values,
@@ -299,10 +331,20 @@ class _Channel:
         self._counters = counters
         silent_s = (None if topic.last_message_s is None
                     else time.monotonic() - topic.last_message_s)
-        design = self._design
+        stale_s = (None if topic.last_published_s is None
+                   else time.monotonic() - topic.last_published_s)
+        design, publishers = self._design, self._publishers()
+        if len(publishers) == 1:
+            self._alone = publishers
         level, message = health.judge(health.Situation(
+            stale_s=stale_s, stale_after_s=self._node.value("stale_after_s"),
+            faults=topic.stream.faults if topic.rate_hz else ("",) * 3,
+            on_fault=self._node.value("on_fault"),
+            other_publishers=tuple(p.node for p in publishers if p not in self._alone),
+            frames=(topic.tracks.first_frame, topic.tracks.other_frame),
+            takes_first=self._node.value("on_two_publishers") == "first",
             topic=topic.name, model_file=self._node.value("model_file"), failure=topic.failure,
-            designing=topic.designing, publishers=self._publishers(),
+            designing=topic.designing, publishers=publishers,
             refused_subscribers=self._refused_subscribers(),
             seconds_since_message=silent_s,
             stated_rate_hz=self._node.value("sample_rate_hz"),
