@@ -106,7 +106,8 @@ def fates(counters):
              "stamps_back": "with a stamp that goes back", "early": "too many by their stamps",
              "not_finite": "not finite", "implausible": "that cannot be true",
              "without_rate": "too far apart to tell the rate",
-             "distrusted": "with an axis that is dead, stuck, saturated or held", "filled": "missing and bridged",
+             "distrusted": "with an axis that is dead, stuck, saturated or held",
+             "filled": "missing and bridged",
              "clipped": "at the limits of the range",
              "without_temperature": "without a temperature (25 °C assumed)"}
     return ", ".join(f"{counters[name]} {text}" for name, text in words.items()

@@ -26,7 +26,7 @@ import numpy as np
 CEILING = 1e8
 # Share of the span by which values may be beyond the limits of the model.
 MARGIN = 0.25
-WIDER, RESTLESS, FASTER, TAIL = 8.0, 2.0, 4.0, 128
+WIDER, RESTLESS, FASTER, TAIL = 12.0, 2.0, 4.0, 128
 # A smaller value [m/s²] is never suspect: no spike of a tenth of gravity is absurd.
 FLOOR = 1.0
 LOOK, ALONE = 8, 4
