@@ -434,15 +434,12 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def is_link(effect):
-
-
 for _tag in ("int", "float"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}",
                             getattr(_Loader, f"construct_yaml_{_tag}"))
 
 
-def _is_link(effect):
+def is_link(effect):
     """Whether an effect is a linear link (the base class's response is one throughout)."""
     return type(effect).transfer_function is not Effect.transfer_function
 

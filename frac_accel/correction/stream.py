@@ -560,23 +560,27 @@ class Stream:
             result, spread = result[given], spread[given]
         if len(index):
             self._last_given = int(index[-1])
-            codes = self._monitors.codes(index + self.design.delay_samples)
-            if codes is not None and codes.any() and self._on_fault != "report":
-                index, stamps, result, spread = self._distrust(codes > 0, index, stamps, result,
-                                                               spread)
-        self._totals["given"] += len(index)
-        return Filtered(index, self._stamps(stamps), *self._after(result, spread, index, stamps))
+        filtered = Filtered(index, self._stamps(stamps),
+                            *self._after(result, spread, index, stamps))
+        codes = (self._monitors.codes(index + self.design.delay_samples)
+                 if len(index) and self._on_fault != "report" else None)
+        if codes is not None and codes.any():
+            filtered = self._distrust(codes > 0, filtered)
+        self._totals["given"] += len(filtered)
+        return filtered
 
-    def _distrust(self, is_faulty, index, stamps, result, spread):
-        """Samples of which some axes are faulty, as `on_fault` wants them."""
+    def _distrust(self, is_faulty, filtered):
+        """`Filtered` of which some axes are faulty, as `on_fault` wants it."""
         rows = is_faulty.any(axis=1)
         if self._on_fault == "drop":
             self._totals["faulty"] += int(rows.sum())
-            return index[~rows], stamps[~rows], result[~rows], spread[~rows]
+            return Filtered(*(getattr(filtered, field.name)[~rows]
+                              for field in dataclasses.fields(Filtered)))
         self._totals["distrusted"] += int(rows.sum())
         # a message cannot say that one axis is bad and another's noise unknown
-        unknown = rows[:, None] & np.isnan(spread)
-        return index, stamps, result, np.where(is_faulty | unknown, DISTRUSTED, spread)
+        unknown = rows[:, None] & np.isnan(filtered.variance)
+        return dataclasses.replace(filtered, variance=np.where(is_faulty | unknown, DISTRUSTED,
+                                                               filtered.variance))
 
 
 def _range_of(plausible_range):
