@@ -233,6 +233,10 @@ class SensorModel:
         """
         return functools.partial(_removed, self._live_stages(sampling_rate_hz))
 
+    def without_sample_effects(self, values, circumstances):
+        """Samples (n, 3) before the effects on them, sample by sample: no stream is remembered."""
+        return _removed(self._stages, values, np.zeros_like(values), circumstances)[0]
+
     def _live_stages(self, sampling_rate_hz):
         return [(cause, {axis: effect.live(sampling_rate_hz) for axis, effect in by_axis.items()})
                 for cause, by_axis in self._stages]

@@ -95,8 +95,8 @@ class Corrector(Stream):
         at = self._circumstances(index, stamps_ns)
         every = Circumstances(*(None if part is None else np.tile(part, MEMBERS) for part in at))
         wrong = (values[:, :, None] + members).transpose(2, 0, 1).reshape(-1, 3)
-        right = self._model.remove_sample_effects(values, at)[0]
-        wrong = self._model.remove_sample_effects(wrong, every)[0]
+        right = self._model.without_sample_effects(values, at)
+        wrong = self._model.without_sample_effects(wrong, every)
         return wrong.reshape(MEMBERS, -1, 3).transpose(1, 2, 0) - right[:, :, None]
 
     def _stamps(self, stamps_ns):
