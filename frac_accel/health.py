@@ -4,6 +4,7 @@ import dataclasses
 
 from .correction.timing import RATE_SAMPLES
 from .live_metrics import Findings
+from .model import AXES
 
 OK, WARN, ERROR = range(3)
 
@@ -17,7 +18,13 @@ _DROPPED = {
     "stamps_back": "had a stamp before the one before",
     "early": "came too early for the sampling rate",
     "not_finite": "had a value that is not finite",
+    "implausible": "had a value that cannot be true",
+    "other_publisher": "came from another publisher",
+    "without_rate": "were too far apart to tell the sampling rate: most samples are lost",
 }
+_FAULTS = {"dead": "says nothing but zero", "stuck": "is stuck at one value",
+           "saturated": "is at the end of its range", "held": "repeats its samples",
+           "too fast": "changes faster than stated"}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,6 +70,20 @@ class Situation:
     counters, changes : dict of str to int
         Counters, and what they have grown by in the last period. Besides those of `Stream`:
         ``malformed``, ``lost``, ``late``, ``without_filter``.
+    stale_s : float or None
+        Time since the last output, where there ever was one.
+    stale_after_s : float
+        From when on that is too long.
+    faults : tuple of str
+        What is wrong with each axis, as `Stream.faults` says it.
+    on_fault : str
+        What is done then.
+    other_publishers : tuple of str
+        Who has joined the publisher that was there first.
+    frames : tuple of str
+        Frame of the publisher that is corrected, and of the other one.
+    takes_first : bool
+        Whether, of two publishers, the first is corrected.
     load : float
         Share of one core that the process uses.
     findings : Findings
@@ -82,6 +103,13 @@ class Situation:
     warm_up_samples: int | None = None
     counters: dict = dataclasses.field(default_factory=dict)
     changes: dict = dataclasses.field(default_factory=dict)
+    stale_s: float | None = None
+    stale_after_s: float = 0.5
+    faults: tuple = ("", "", "")
+    on_fault: str = "covariance"
+    other_publishers: tuple = ()
+    frames: tuple = ("", "")
+    takes_first: bool = True
     load: float = 0.0
     findings: Findings = dataclasses.field(default_factory=Findings)
     reference_silent_s: float | None = None
@@ -99,10 +127,13 @@ def judge(situation):
     """
     reason = _silence(situation)
     if reason:
+        level, message = reason
+        if situation.stale_s is not None and situation.stale_s > situation.stale_after_s:
+            return ERROR, f"{message}; the last output is {situation.stale_s:.1f} s old"
         return reason
-    troubles = _troubles(situation)
-    if troubles:
-        return WARN, "; ".join(troubles)
+    grave, troubles = _grave(situation), _troubles(situation)
+    if grave or troubles:
+        return (ERROR if grave else WARN), "; ".join([*grave, *troubles])
     return OK, f"correcting at {situation.sample_rate_hz:.6g} Hz"
 
 
@@ -135,19 +166,27 @@ def _no_output(s):
     changes = s.changes
     if changes.get("given"):
         return None
-    received = changes.get("samples", 0)
+    received = changes.get("samples", 0) + changes.get("other_publisher", 0)
+    idle = not (received or changes.get("malformed") or s.designing)
+    if idle and s.seconds_since_message is not None:
+        return WARN, f"no message on {s.topic} for {s.seconds_since_message:.1f} s"
+    grave = _grave(s)
+    if changes.get("faulty") and grave:
+        return ERROR, "; ".join(grave)
+    if not s.takes_first and changes.get("other_publisher"):
+        return ERROR, f"{_two_publishers(s)}: none is corrected"
     if not received and changes.get("malformed"):
         return ERROR, (f"all {changes['malformed']} messages of the last second could not be read "
                        f"as the type of {s.topic}")
     if s.designing:
         return WARN, "the filter is being designed"
-    if s.sample_rate_hz is None:
-        return _no_rate(s)
     dropped = {name: changes.get(name, 0) for name in _DROPPED}
     if received and sum(dropped.values()) >= received:
         causes = ", ".join(f"{count} {_DROPPED[name]}" for name, count in dropped.items() if count)
         hint = ("; sample_rate_hz may be too low" if dropped["early"] else "")
         return ERROR, f"all {received} samples of the last second were dropped: {causes}{hint}"
+    if s.sample_rate_hz is None:
+        return _no_rate(s)
     if changes.get("restarts", 0) > 1:
         return ERROR, (f"the filter started anew {changes['restarts']} times in the last second "
                        "because of gaps in the stamps: samples are lost, or sample_rate_hz is "
@@ -164,11 +203,29 @@ def _no_rate(s):
     return WARN, f"estimating the sampling rate: {waiting} of {RATE_SAMPLES} samples"
 
 
+def _two_publishers(s):
+    names = f" ({', '.join(s.other_publishers)})" if s.other_publishers else ""
+    frame = f" with frame {s.frames[1]!r}" if s.frames[1] and s.frames[1] != s.frames[0] else ""
+    return f"{s.topic} has another publisher{names}{frame}"
+
+
+def _grave(s):
+    """What makes the output worthless on some axis, or would."""
+    done = {"covariance": "its covariance says so", "drop": "no sample is given",
+            "report": "its samples are given as ever"}[s.on_fault]
+    grave = [f"axis {axis} {_FAULTS[fault]}: {done}"
+             for axis, fault in zip(AXES, s.faults) if fault]
+    if s.changes.get("other_publisher") and s.takes_first:
+        grave.append(f"{_two_publishers(s)}, whose {s.changes['other_publisher']} messages were "
+                     "dropped")
+    return grave
+
+
 def _troubles(s):
     changes = s.changes
     troubles = []
     for name, text in _DROPPED.items():
-        if changes.get(name):
+        if changes.get(name) and name != "other_publisher":
             troubles.append(f"{changes[name]} samples {text} and were dropped")
     if changes.get("gaps"):
         troubles.append(f"{changes['gaps']} gaps were bridged over {changes.get('filled', 0)} "

@@ -28,6 +28,8 @@ class LiveSimulator(Stream):
     jumps changes stamps. A nonlinear spring and friction are simulated offline alone.
     """
 
+    _is_watched = False
+
     def _design(self, model, sample_rate_hz, **wishes):
         return design_simulator(model, sample_rate_hz, **wishes)
 

@@ -3,6 +3,7 @@
 import dataclasses
 import difflib
 import functools
+import hashlib
 import math
 import re
 
@@ -16,12 +17,14 @@ from .effects import Circumstances, Effect, effect_names, effect_of
 from .errors import ModelError
 from .outputs import write_text
 from .parameters import as_mapping, build, number, parameter_fields, plain
+from .regular_file import open_regular
 
 SCHEMA = "frac_accel/sensor_model/1"
 _ANY_SCHEMA = r"frac_accel/sensor_model/\d{1,3}"
 AXES = "xyz"
 _OWN_KEYS = ("schema", "core", "effects", "axes", "reference_faults")
-_LARGEST_FILE = 10_000_000
+# A model is a few kilobytes; YAML takes seconds to read a megabyte.
+_LARGEST_FILE = 64 * 1024
 
 
 @dataclasses.dataclass(frozen=True)
@@ -181,6 +184,12 @@ class SensorModel:
         return float(self.metadata.get("noise_std", 0.0))
 
     @property
+    def plausible_range(self):
+        """Lowest and highest output that can be true, or None where the model does not say."""
+        pair = self.metadata.get("plausible_range")
+        return pair and tuple(float(edge) for edge in pair)
+
+    @property
     def band_hz(self):
         """Lowest and highest frequency [Hz] for which the model was identified, or None."""
         return self.metadata.get("band_hz")
@@ -223,6 +232,10 @@ class SensorModel:
             of the samples' noise (0 where it is not known), for consecutive blocks.
         """
         return functools.partial(_removed, self._live_stages(sampling_rate_hz))
+
+    def without_sample_effects(self, values, circumstances):
+        """Samples (n, 3) before the effects on them, sample by sample: no stream is remembered."""
+        return _removed(self._stages, values, np.zeros_like(values), circumstances)[0]
 
     def _live_stages(self, sampling_rate_hz):
         return [(cause, {axis: effect.live(sampling_rate_hz) for axis, effect in by_axis.items()})
@@ -283,6 +296,9 @@ class SensorModel:
             raise ModelError(f"noise_std: {data['noise_std']!s:.60} given, expected at least 0")
         if "band_hz" in data:
             _require_band(data["band_hz"])
+        if "plausible_range" in data:
+            _require_pair(data["plausible_range"], "plausible_range",
+                          "two numbers in output units, ascending", -np.inf)
         metadata = {key: plain(data[key]) for key in data if key not in _OWN_KEYS}
         faults = _effects(data.get("reference_faults"), "reference_faults")
         return cls(core, effects, axes, metadata, faults)
@@ -305,23 +321,29 @@ class SensorModel:
         ModelError
             Naming the file, the field, its value and what was expected.
         """
+        return cls.load_with_hash(path)[0]
+
+    @classmethod
+    def load_with_hash(cls, path):
+        """Model from a YAML file, and the SHA-256 of what was read; raises as `load`."""
+        data = _read(path)
         try:
-            with open(path, encoding="utf-8") as file:
-                text = file.read(_LARGEST_FILE + 1)
-        except (OSError, ValueError) as error:
-            reason = ("not a text file" if isinstance(error, UnicodeDecodeError)
-                      else getattr(error, "strerror", None) or error)
-            raise ModelError(f"{path}: cannot read the model: {reason}") from None
-        if len(text) > _LARGEST_FILE:
-            raise ModelError(f"{path}: larger than {_LARGEST_FILE // 1_000_000} MB, "
-                             "expected a sensor model")
+            text = data.decode()
+        except UnicodeDecodeError:
+            raise ModelError(f"{path}: cannot read the model: not a text file") from None
         try:
-            data = safe_yaml.load(text)
+            content = safe_yaml.load(text)
         except safe_yaml.YamlError as error:
             is_quoted = not error.quotes or _says_it_is_a_model(text)
             problem = f": {error.problem}" if is_quoted else ""
             raise ModelError(f"{path}{error.where}: not valid YAML{problem}") from None
-        return cls.from_dict(data, where=str(path))
+        try:
+            return cls.from_dict(content, where=str(path)), hashlib.sha256(data).hexdigest()
+        except ModelError:
+            raise
+        except Exception as error:  # whatever stands in a file, it is a refusal
+            raise ModelError(f"{path}: cannot be understood as a sensor model: "
+                             f"{type(error).__name__}") from error
 
     def save(self, path):
         """Write the model as YAML; the file is complete or not there."""
@@ -353,6 +375,19 @@ def _require_schema(data):
 def _says_it_is_a_model(text):
     """Whether a line of the text says so, as far as can be said where YAML is not read."""
     return re.search(rf"""^schema:\s*['"]?{_ANY_SCHEMA}\b""", text, re.M) is not None
+
+
+def _read(path):
+    """Bytes of a model file."""
+    try:
+        with open_regular(path) as file:
+            data = file.read(_LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise ModelError(f"{path}: cannot read the model: {reason}") from None
+    if len(data) > _LARGEST_FILE:
+        raise ModelError(f"{path}: larger than {_LARGEST_FILE // 1024} KB, expected a sensor model")
+    return data
 
 
 def _removed(stages, values, variance, circumstances):
@@ -403,12 +438,15 @@ def _require_known_keys(data):
 
 
 def _require_band(band):
-    expected = "two numbers in Hz, at least 0 and ascending"
-    if not isinstance(band, list) or len(band) != 2:
-        raise ModelError(f"band_hz: {band!r:.60} given, expected {expected}")
-    low, high = (number(edge, f"band_hz[{i}]", expected) for i, edge in enumerate(band))
-    if not 0 <= low < high:
-        raise ModelError(f"band_hz: {band!r:.60} given, expected {expected}")
+    _require_pair(band, "band_hz", "two numbers in Hz, at least 0 and ascending", 0.0)
+
+
+def _require_pair(pair, where, expected, least):
+    if not isinstance(pair, list) or len(pair) != 2:
+        raise ModelError(f"{where}: {pair!r:.60} given, expected {expected}")
+    low, high = (number(edge, f"{where}[{i}]", expected) for i, edge in enumerate(pair))
+    if not least <= low < high:
+        raise ModelError(f"{where}: {pair!r:.60} given, expected {expected}")
 
 
 def _core(entry, where):
@@ -444,9 +482,9 @@ def _effects(entries, where):
         known = effect_names()
         if not isinstance(cause, str) or cause not in known:
             close = difflib.get_close_matches(str(cause), known, n=1)
-            hint = f"; did you mean {close[0]!r}?" if close else ""
-            raise ModelError(f"{place}.cause: unknown cause {cause!r:.60}, expected one of "
-                             f"{', '.join(known)}{hint}")
+            expected = f"did you mean {close[0]!r}?" if close else \
+                f"expected one of the {len(known)} of docs/effects.md, such as {known[0]}"
+            raise ModelError(f"{place}.cause: unknown cause {cause!r:.60}; {expected}")
         try:
             effect = effect_of(cause)
         except ModelError as error:

@@ -45,6 +45,16 @@ def test_all_is_well():
     (changed(changes=SILENT | {"restarts": 7}, stated_rate_hz=500.0), ERROR,
      "started anew 7 times in the last second because of gaps in the stamps: samples are lost, or "
      "sample_rate_hz is wrong, but the stamps advance at 2000 Hz"),
+    (changed(changes={}, seconds_since_message=1.4), WARN, "no message on /imu/data_raw for 1.4 s"),
+    (changed(changes={}, seconds_since_message=1.4, stale_s=1.4), ERROR, "output is 1.4 s old"),
+    (changed(changes=SILENT, stale_s=2.0, stale_after_s=0.5), ERROR, "last output is 2.0 s"),
+    (changed(changes=SILENT | {"implausible": 2000}), ERROR, "had a value that cannot be true"),
+    (changed(changes=SILENT | {"without_rate": 2000}, sample_rate_hz=None), ERROR,
+     "too far apart to tell the sampling rate"),
+    (changed(changes=SILENT | {"faulty": 2000}, faults=("", "dead", ""), on_fault="drop"), ERROR,
+     "axis y says nothing but zero: no sample is given"),
+    (changed(changes={"other_publisher": 900}, takes_first=False, other_publishers=("/b",)), ERROR,
+     "/imu/data_raw has another publisher (/b): none is corrected"),
     (changed(changes=SILENT), WARN, "the filter is warming up: 17 of 33 samples"),
 ])
 def test_silence_is_explained(situation, level, words):
@@ -71,4 +81,17 @@ def test_silence_is_explained(situation, level, words):
 def test_troubles_are_warnings(situation, words):
     level, message = judge(situation)
     assert level == WARN
+    assert words in message
+
+
+@pytest.mark.parametrize("situation, words", [
+    (changed(faults=("", "stuck", "")), "axis y is stuck at one value: its covariance says so"),
+    (changed(faults=("held", "", "saturated")), "axis z is at the end of its range"),
+    (changed(changes=GOOD.changes | {"other_publisher": 7}, other_publishers=("/b",),
+             frames=("a", "b")),
+     "has another publisher (/b) with frame 'b', whose 7 messages were dropped"),
+])
+def test_what_makes_an_axis_worthless_is_an_error(situation, words):
+    level, message = judge(situation)
+    assert level == ERROR
     assert words in message

@@ -194,7 +194,7 @@ BAD = [
     (data_of(effects="offset"), ["effects", "'offset' given", "list"]),
     (data_of(effects=["offset"]), ["effects[0]", "'offset' given", "mapping"]),
     (data_of(effects=[None]), ["effects[0]", "nothing given", "mapping"]),
-    (effect_of(delay_s=1.0), ["effects[0].cause", "unknown cause None", "time_delay"]),
+    (effect_of(delay_s=1.0), ["effects[0].cause", "unknown cause None", "docs/effects.md"]),
     (effect_of(cause="time_dela", delay_s=1.0), ["effects[0].cause", "'time_dela'",
                                                  "did you mean 'time_delay'"]),
     (effect_of(cause=["offset"], offset=1.0), ["effects[0].cause", "['offset']"]),
@@ -260,8 +260,10 @@ TEXTS = {
     "mapping as key": ("? {a: 1}\n: 3\n", "not valid YAML"),
     "control character": ("a: \x07", "not valid YAML"),
     "impossible date": ("a: 2024-99-99", "not valid YAML"),
-    "long number": ("a: " + "1:" * 400_000 + "1", "a number of"),
-    "long hexadecimal": (f"schema: {SCHEMA}\nnoise_std: 0x{'f' * 6000}\n", "a number of 6002"),
+    "base 60": (f"schema: {SCHEMA}\nnoise_std: " + "1:" * 20_000 + "1", "number with colons"),
+    "base 60, broken": ("a: 1:30.5", "number with colons"),
+    "huge hexadecimal": (f"schema: {SCHEMA}\nseed: 0x" + "f" * 6000, "more than 40 digits"),
+    "huge decimal": ("a: " + "9" * 60_000, "more than 40 digits"),
     "a tag that makes nothing": ("a: !!timestamp x", "a tag"),
     "a number that is none": ("a: 0b_", "not valid YAML"),
     "empty": ("", "nothing given"),
@@ -326,8 +328,13 @@ def test_files_that_are_none(tmp_path):
     huge = tmp_path / "huge.yaml"
     with open(huge, "wb") as file:
         file.truncate(50_000_000)
-    with pytest.raises(ModelError, match="larger than 10 MB"):
+    with pytest.raises(ModelError, match="larger than 64 KB"):
         SensorModel.load(huge)
+    fifo = tmp_path / "fifo.yaml"
+    os.mkfifo(fifo)
+    for special in (fifo, "/dev/zero", "/dev/null"):
+        with pytest.raises(ModelError, match="not a regular file"):
+            SensorModel.load(special)
     with pytest.raises(ModelError, match="null byte"):
         SensorModel.load(str(tmp_path / "a\0b"))
 

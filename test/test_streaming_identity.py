@@ -74,7 +74,8 @@ def same(a, b):
 def invariant(counters):
     return counters["samples"] == sum(
         counters.get(name, 0) for name in ("given", "waiting", "warm_up", "cut_off", "duplicates",
-                                           "stamps_back", "early", "not_finite"))
+                                           "stamps_back", "early", "not_finite", "implausible",
+                                           "without_rate", "faulty"))
 
 
 def random_case(seed):

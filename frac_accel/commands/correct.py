@@ -102,7 +102,10 @@ def fates(counters):
     words = {"warm_up": "before the filter was full", "waiting": "after the last full filter",
              "cut_off": "before a long gap", "duplicates": "with a repeated stamp",
              "stamps_back": "with a stamp that goes back", "early": "too many by their stamps",
-             "not_finite": "not finite", "filled": "missing and bridged",
+             "not_finite": "not finite", "implausible": "that cannot be true",
+             "without_rate": "too far apart to tell the rate",
+             "distrusted": "with an axis that is dead, stuck, saturated or held",
+             "filled": "missing and bridged",
              "clipped": "at the limits of the range",
              "without_temperature": "without a temperature (25 °C assumed)"}
     return ", ".join(f"{counters[name]} {text}" for name, text in words.items()

@@ -2,8 +2,11 @@
 
 import numpy as np
 
+from ..effects import Circumstances
 from ..time_steps import moved
-from .design import design_inverse
+from .bridging import MEMBERS
+from .design import design_inverse, reference_gain
+from .plausibility import stated_range
 from .stream import Stream
 
 
@@ -18,6 +21,9 @@ class Corrector(Stream):
     noise_std : float or sequence of three, optional
         Standard deviation of the raw samples' white noise [output units], used where a sample
         comes without a variance. Default: the model's, if it has one.
+    plausible_range : sequence of two floats, optional
+        Lowest and highest raw value that can be true [output units]; default: the model's key of
+        that name, else its limits of clipping, else what the record itself says (`plausibility`).
     **wishes
         ``bandwidth_hz``, ``max_delay_s``, ``lowest_hz``, ``tolerance`` as in `design_inverse`.
 
@@ -74,6 +80,24 @@ class Corrector(Stream):
         gain = np.stack([np.broadcast_to(axis.base_gain(time_s), len(time_s))
                          for axis in self._model.axes], axis=1)
         return values / gain, variance / gain**2
+
+    def _stated_range(self):
+        model = self._model
+        gain = np.array([reference_gain(axis, model.band_hz) for axis in model.axes])
+        return stated_range(self._plausible_range or model.plausible_range, model.limits, gain)
+
+    def _limits(self):
+        return self._model.limits
+
+    def _errors_before(self, members, values, index, stamps_ns):
+        if not self._has_effects:
+            return members
+        at = self._circumstances(index, stamps_ns)
+        every = Circumstances(*(None if part is None else np.tile(part, MEMBERS) for part in at))
+        wrong = (values[:, :, None] + members).transpose(2, 0, 1).reshape(-1, 3)
+        right = self._model.without_sample_effects(values, at)
+        wrong = self._model.without_sample_effects(wrong, every)
+        return wrong.reshape(MEMBERS, -1, 3).transpose(1, 2, 0) - right[:, :, None]
 
     def _stamps(self, stamps_ns):
         """Instants that the samples with these stamps show."""

@@ -6,13 +6,19 @@ import dataclasses
 import numpy as np
 
 from ..effects import Circumstances
-from ..errors import FracAccelError
+from ..errors import DesignError, FracAccelError
+from .bridging import BridgeEnsemble
 from .filter import FilterState, ParallelFilter, UnknownHistory
+from .monitors import AxisMonitors
 from .parameter_uncertainty import ParameterUncertaintyState
+from .plausibility import Plausibility, stated_range
 from .static_terms import StaticTermsState
 from .temperature import HeldTemperature
-from .timing import LARGEST, RATE_SAMPLES, SampleClock, estimate_rate
+from .timing import LARGEST, RATE_SAMPLES, SampleClock, estimate_rate, tells_rate
 
+# Variance of a faulty axis [output units squared]: no fusion filter gives it any weight.
+DISTRUSTED = 1e9
+ON_FAULT = ("covariance", "drop", "report")
 # Samples kept for a change of model: the new filter starts with these behind it.
 HISTORY = 4096
 # Most samples that are held while their stamps do not advance.
@@ -61,6 +67,13 @@ class Stream:
     noise_std : float or sequence of three, optional
         Standard deviation of the white noise of the input, used where a sample comes without a
         variance.
+    plausible_range : sequence of two floats, optional
+        Lowest and highest value that can be true; default: see `plausibility`.
+    on_fault : {"covariance", "drop", "report"}
+        What happens to the output while an axis is faulty (`monitors`): its variance becomes
+        `DISTRUSTED`, nothing is given out, or nothing happens.
+    largest_rate : float
+        Largest rate of change [input units/s] that is no fault; 0: any.
     **wishes
         Passed on to `_design`.
 
@@ -71,19 +84,30 @@ class Stream:
     What happens to stamps that scatter, repeat, go back or leave gaps stands in `timing`.
     `counters` says how many samples met which fate; always ``samples`` = ``given`` +
     ``waiting`` + ``warm_up`` + ``cut_off`` + ``duplicates`` + ``stamps_back`` + ``early`` +
-    ``not_finite``.
+    ``not_finite`` + ``implausible`` + ``without_rate`` + ``faulty``. Those given while an axis
+    was distrusted are ``distrusted``.
     """
 
-    def __init__(self, model, sample_rate_hz=0.0, noise_std=None, **wishes):
+    # Whether the axes are watched; what drives a simulation may stand still.
+    _is_watched = True
+
+    def __init__(self, model, sample_rate_hz=0.0, noise_std=None, plausible_range=None,
+                 on_fault="covariance", largest_rate=0.0, **wishes):
         if not np.isfinite(sample_rate_hz) or sample_rate_hz < 0:
             raise FracAccelError(f"sample_rate_hz: {sample_rate_hz} given, expected a number above "
                                  "0, or 0 to estimate it from the stamps")
         self._wishes = wishes
         self._adopt(model)
         self._noise_std = noise_std
+        if on_fault not in ON_FAULT:
+            raise FracAccelError(f"on_fault: {on_fault!r} given, expected one of "
+                                 f"{', '.join(ON_FAULT)}")
+        self._on_fault, self._largest_rate = on_fault, largest_rate
+        self._plausible_range = _range_of(plausible_range)
         self._held, self._held_count, self._advancing = [], 0, False
         self._samples = 0
-        self._totals = dict.fromkeys(("given", "warm_up", "cut_off", "duplicates"), 0)
+        self._totals = dict.fromkeys(("given", "warm_up", "cut_off", "duplicates",
+                                      "without_rate", "faulty", "distrusted"), 0)
         self._temperature = HeldTemperature()
         self._record_start_ns = self._record_end_ns = None
         self._clock = None
@@ -103,11 +127,16 @@ class Stream:
         return self.design.sampling_rate_hz if self.design else None
 
     @property
+    def faults(self):
+        """What is wrong with each axis now, tuple of str: see `monitors.FAULTS`."""
+        return self._monitors.faults if self._clock else ("",) * 3
+
+    @property
     def counters(self):
         """How many samples met which fate, as a new dict of str to int."""
         counters = {"samples": self._samples, "waiting": self._held_count, **self._totals}
         if self._clock:
-            counters["waiting"] = int(np.sum(self._waiting_index >= 0))
+            counters["waiting"] = int(np.sum(self._waiting_index >= 0)) + self._plausibility.waiting
             for name, count in self._clock.counters.items():
                 counters[name] = counters.get(name, 0) + count
         return counters
@@ -117,7 +146,9 @@ class Stream:
         """Running numbers of the samples that can still be given out, ascending."""
         if self._clock is None:
             return np.concatenate([np.empty(0, np.int64), *(block[0] for block in self._held)])
-        return self._waiting_index[self._waiting_index > self._last_given]
+        waiting = self._waiting_index[self._waiting_index > self._last_given]
+        held = self._plausibility.held
+        return np.concatenate([waiting, held[0]]) if held else waiting
 
     def process(self, stamps_ns, values, variance=None):
         """Filter the next samples.
@@ -173,7 +204,7 @@ class Stream:
             self._temperature.set(self._samples, float(celsius))
 
     def finish(self):
-        """Filter what is still held because the stream ended before its rate was known.
+        """Filter what is still held: there is no more to tell the rate or what is plausible by.
 
         Returns
         -------
@@ -184,19 +215,29 @@ class Stream:
         FracAccelError
             If the rate cannot be estimated at all.
         """
-        if self._clock is not None or not self._held:
-            return _concatenated([])
-        if not self._estimate(2):
-            raise FracAccelError(
-                f"the sampling rate cannot be estimated from {self._samples} sample(s) whose "
-                "stamps do not advance; give it as sample_rate_hz")
-        return self._filter_held()
+        if self._clock is None:
+            if not self._held_count:
+                return _concatenated([])
+            if not self._estimate(2):
+                raise FracAccelError(
+                    f"the sampling rate cannot be estimated from {self._samples} sample(s) whose "
+                    "stamps do not advance or are too far apart; give it as sample_rate_hz")
+            ready = self._filter_held()
+            return _concatenated([ready, self._filter_decided(*self._nothing_more())])
+        return self._filter_decided(*self._nothing_more())
 
-    def prepare(self, model, **wishes):
+    def prepare(self, model, design=None, **wishes):
         """Design the filters of another model without using them yet.
 
         It may run in another thread than `process`; `replace` with the same model and wishes then
         takes no time.
+
+        Parameters
+        ----------
+        model, **wishes
+            As in `replace`.
+        design : FilterDesign, optional
+            That of this model at this rate with these wishes, where somebody has made it already.
 
         Raises
         ------
@@ -205,7 +246,8 @@ class Stream:
         """
         wishes = {**self._wishes, **wishes}
         if self.sample_rate_hz:
-            self._prepared = model, wishes, self._design(model, self.sample_rate_hz, **wishes)
+            design = design or self._designed(model, self.sample_rate_hz, wishes)
+            self._prepared = model, wishes, design
 
     def replace(self, model, **wishes):
         """Go on with another model, without losing a sample.
@@ -235,7 +277,7 @@ class Stream:
         if prepared and prepared[0] is model and prepared[1] == wishes:
             design = prepared[2]
         else:
-            design = self._design(model, self.sample_rate_hz, **wishes)
+            design = self._designed(model, self.sample_rate_hz, wishes)
         self._adopt(model)
         self._wishes = wishes
         self._use(design)
@@ -249,6 +291,28 @@ class Stream:
     def _design(self, model, sample_rate_hz, **wishes):
         """FilterDesign for a model at a sampling rate."""
         raise NotImplementedError
+
+    def _designed(self, model, sample_rate_hz, wishes):
+        """The same; whatever goes wrong is a DesignError."""
+        try:
+            return self._design(model, sample_rate_hz, **wishes)
+        except FracAccelError:
+            raise
+        except Exception as error:  # a model can be beyond what the linear algebra can bear
+            raise DesignError("the filter cannot be designed with these parameters: "
+                              f"{type(error).__name__}") from error
+
+    def _stated_range(self):
+        """What `stated_range` says of this stream's input."""
+        return stated_range(self._plausible_range, self._limits(), np.ones(3))
+
+    def _limits(self):
+        """Lowest and highest value that each axis of the input can say, shape (3,) each."""
+        return np.full(3, -np.inf), np.full(3, np.inf)
+
+    def _errors_before(self, members, values, index, stamps_ns):
+        """Ensemble of errors (m, 3, k) of samples (m, 3), after what `_before` does to these."""
+        return members
 
     def _count(self, values):
         """Count what is to be counted of incoming samples, shape (n, 3)."""
@@ -288,20 +352,29 @@ class Stream:
         return self._filter(*(np.concatenate(part) for part in zip(*held)))
 
     def _estimate(self, least):
-        """Start at the rate of the first stamps, if there are enough of them.
+        """Start at the rate of the first stamps that tell it, if there are enough of them.
 
         Which stamps these are must not depend on the blocks in which they come.
         """
-        if not self._advancing or self._held_count < least:
-            return False
-        stamps = np.concatenate([block[1] for block in self._held])
-        first = int(np.argmax(np.diff(stamps) > 0))
-        self._start(estimate_rate(stamps[:max(RATE_SAMPLES, first + 2)]))
-        return True
+        while self._advancing and self._held_count >= least:
+            index, stamps, values, variance = (np.concatenate(part) for part in zip(*self._held))
+            count = max(RATE_SAMPLES, int(np.argmax(np.diff(stamps) > 0)) + 2)
+            if tells_rate(stamps[:count]):
+                self._start(estimate_rate(stamps[:count]))
+                return True
+            # most of the samples are missing between them
+            self._totals["without_rate"] += len(stamps[:count])
+            self._held = [(index[count:], stamps[count:], values[count:], variance[count:])]
+            self._held_count = len(index[count:])
+            self._advancing = bool((np.diff(stamps[count:]) > 0).any())
+            if not self._held_count:
+                self._held = []
+        return False
 
     def _start(self, rate):
-        self._use(self._design(self._model, rate, **self._wishes))
+        self._use(self._designed(self._model, rate, self._wishes))
         self._clock = SampleClock(rate, self.design.warm_up_samples)
+        self._clock.noise_variance = self._noise_variance
         self._last_given = -1
         self._forget()
         self._begin()
@@ -312,6 +385,15 @@ class Stream:
             self._clock.longest_gap = design.warm_up_samples
         noise = self._model.noise_std if self._noise_std is None else self._noise_std
         self._noise_variance = np.broadcast_to(np.square(np.asarray(noise, float)), 3)
+        noise_std = np.sqrt(self._noise_variance)
+        if self._clock:
+            self._monitors.set_limits(self._limits(), noise_std)
+            self._clock.noise_variance = self._noise_variance
+            self._plausibility.set_range(*self._stated_range())
+        else:
+            self._plausibility = Plausibility(*self._stated_range())
+            self._monitors = AxisMonitors(design.sampling_rate_hz, self._limits(), noise_std,
+                                          self._largest_rate)
 
     def _begin(self):
         """Nothing is known of the motion before the next sample."""
@@ -320,9 +402,18 @@ class Stream:
         self._waiting_index = np.empty(0, np.int64)
         self._waiting_stamps = np.empty(0, np.int64)
 
-    def _filter(self, index, stamps, values, variance):
+    def _filter(self, *samples):
+        if self._is_watched:
+            self._monitors.add(samples[0], samples[2])
+        return self._filter_decided(*self._plausibility.judge(*samples))
+
+    def _nothing_more(self):
+        none = np.empty(0, np.int64)
+        return self._plausibility.judge(none, none, np.empty((0, 3)), np.empty((0, 3)), True)
+
+    def _filter_decided(self, index, stamps, values, variance, plausible, finite):
         parts = []
-        for run in self._clock.sort(index, stamps, values, variance):
+        for run in self._clock.sort(index, stamps, values, variance, plausible, finite):
             self._note_time(run.stamps_ns)
             if run.restart:
                 lost = int(np.sum(self._waiting_index >= 0))
@@ -370,20 +461,26 @@ class Stream:
             index = index[following]
             noise_known = None if noise_known is None else noise_known[following]
         values, variance = self._before(run.values, variance, index, run.stamps_ns)
+        bridges = [(at, self._errors_before(members, run.values[at:at + len(members)],
+                                            index[at:at + len(members)],
+                                            run.stamps_ns[at:at + len(members)]))
+                   for at, members in run.bridges]
         if self._states is None:
             if self._kept is not None:
+                bridges = [*self._kept[2], *_shifted(bridges, len(self._kept[0]))]
                 values = np.concatenate([self._kept[0], values])
                 variance = np.concatenate([self._kept[1], variance])
             warm_up = self.design.warm_up_samples
             if len(values) <= warm_up:
-                self._kept = values, variance
+                self._kept = values, variance, bridges
                 return _concatenated([])
-            self._fill(values[:warm_up], variance[:warm_up])
+            self._fill(values[:warm_up], variance[:warm_up], _cut(bridges, 0, warm_up))
+            bridges = _cut(bridges, warm_up, len(values))
             values, variance = values[warm_up:], variance[warm_up:]
-        return self._give(values, variance,
+        return self._give(values, variance, bridges,
                           None if noise_known is None else noise_known[-len(values):])
 
-    def _fill(self, values, variance):
+    def _fill(self, values, variance, bridges):
         """Bring the filters into the state that they have when their taps are first full."""
         self._kept = None
         self._states = []
@@ -417,8 +514,10 @@ class Stream:
                 doubt.process(columns, parts)
             history = (UnknownHistory(design.filter, len(values) + 1)
                        if len(design.filter.poles) else None)
+            ensemble = BridgeEnsemble(design.filter, len(columns))
+            ensemble.process(len(values), _rows_of(bridges, rows))
             self._states.append((rows, state, noise, later, history, power[:, None], static,
-                                 doubt))
+                                 doubt, ensemble))
         # the oldest of the waiting will have been passed over before the first output
         skipped = len(values) - self.design.delay_samples
         fresh = self._waiting_index[:skipped]
@@ -426,11 +525,11 @@ class Stream:
         self._waiting_index = self._waiting_index[skipped:]
         self._waiting_stamps = self._waiting_stamps[skipped:]
 
-    def _give(self, values, variance, noise_known):
+    def _give(self, values, variance, bridges, noise_known):
         count = len(values)
         result, spread = np.empty((3, count)), np.empty((3, count))
         values, variance = np.ascontiguousarray(values.T), np.ascontiguousarray(variance.T)
-        for rows, state, noise, later, history, power, static, doubt in self._states:
+        for rows, state, noise, later, history, power, static, doubt, ensemble in self._states:
             own, known = values[rows], variance[rows]
             corrected = state.process(own)
             total = noise.process(known)
@@ -438,6 +537,9 @@ class Stream:
                 total += later * known
             if history:
                 total += power * history.squared(count)
+            gaps = ensemble.process(count, _rows_of(bridges, rows))
+            if gaps is not None:
+                total += gaps
             parts = ()
             if static:
                 added, more, parts = static.process(own, known)
@@ -458,8 +560,53 @@ class Stream:
             result, spread = result[given], spread[given]
         if len(index):
             self._last_given = int(index[-1])
-        self._totals["given"] += len(index)
-        return Filtered(index, self._stamps(stamps), *self._after(result, spread, index, stamps))
+        filtered = Filtered(index, self._stamps(stamps),
+                            *self._after(result, spread, index, stamps))
+        codes = (self._monitors.codes(index + self.design.delay_samples)
+                 if len(index) and self._on_fault != "report" else None)
+        if codes is not None and codes.any():
+            filtered = self._distrust(codes > 0, filtered)
+        self._totals["given"] += len(filtered)
+        return filtered
+
+    def _distrust(self, is_faulty, filtered):
+        """`Filtered` of which some axes are faulty, as `on_fault` wants it."""
+        rows = is_faulty.any(axis=1)
+        if self._on_fault == "drop":
+            self._totals["faulty"] += int(rows.sum())
+            return Filtered(*(getattr(filtered, field.name)[~rows]
+                              for field in dataclasses.fields(Filtered)))
+        self._totals["distrusted"] += int(rows.sum())
+        # a message cannot say that one axis is bad and another's noise unknown
+        unknown = rows[:, None] & np.isnan(filtered.variance)
+        return dataclasses.replace(filtered, variance=np.where(is_faulty | unknown, DISTRUSTED,
+                                                               filtered.variance))
+
+
+def _range_of(plausible_range):
+    """Two floats, or None."""
+    if plausible_range is None:
+        return None
+    low, high = (float(edge) for edge in plausible_range)
+    if not low < high:
+        raise FracAccelError(f"plausible_range: {low:g} to {high:g} given, expected the lowest and "
+                             "the highest value that can be true")
+    return low, high
+
+
+def _shifted(bridges, by):
+    return [(at + by, members) for at, members in bridges]
+
+
+def _cut(bridges, start, stop):
+    """What lies within so many samples, counted from the first of them."""
+    parts = ((max(at, start), members[max(start - at, 0):max(stop - at, 0)])
+             for at, members in bridges)
+    return [(at - start, members) for at, members in parts if len(members)]
+
+
+def _rows_of(bridges, rows):
+    return [(at, members[:, rows]) for at, members in bridges]
 
 
 def _concatenated(parts):

@@ -7,6 +7,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Temperature
 
+from frac_accel import cdr
 from frac_accel.errors import FracAccelError
 from frac_accel.nodes._runtime import (
     INVALID_ENDPOINT,
@@ -14,6 +15,7 @@ from frac_accel.nodes._runtime import (
     RawSubscription,
     publish_serialized,
 )
+from frac_accel.publisher_tracks import PublisherTracks
 
 # Filtering one sample costs as much as filtering fifty, so above this rate messages are taken in
 # groups, for so long.
@@ -22,6 +24,8 @@ _GROUPING_S = 0.004
 _POLL_S = 0.001
 # Messages that wait for longer than this before what they bring is published count as late.
 LATE_S = 0.05
+# What happens to a topic with two publishers: the one that came first is corrected, or none is.
+ON_TWO_PUBLISHERS = ("first", "none")
 # Most messages that are held while a filter is being made.
 _MOST_HELD = 200_000
 
@@ -65,6 +69,8 @@ class FilteredTopic:
         Whether a filter is only made once there are messages.
     on_processed : callable, optional
         Called with each `Processed` after it has been published, and the time of that [ns].
+    on_two_publishers : str
+        One of `ON_TWO_PUBLISHERS`.
 
     Attributes
     ----------
@@ -79,16 +85,22 @@ class FilteredTopic:
         Messages that waited for longer than `LATE_S`.
     overflowed : int
         Messages that were given up because too many were waiting for a filter.
-    last_message_s : float or None
-        Monotonic time of the last message.
+    other_publisher : int
+        Messages that were dropped since they came from another publisher, or may have.
+    tracks : PublisherTracks
+    last_message_s, last_published_s : float or None
+        Monotonic time of the last message, and of the last output.
     """
 
     def __init__(self, node, message_class, topics, depth, worker, make, is_optional=False,
-                 on_processed=None):
+                 on_processed=None, on_two_publishers="first"):
         self.messages = None
         self.failure = ""
         self.unfiltered = self.published = self.late = self.overflowed = self._deepest = 0
-        self.last_message_s = None
+        self.last_message_s = self.last_published_s = None
+        self.other_publisher = 0
+        self.tracks = PublisherTracks()
+        self._takes_first = on_two_publishers == "first"
         self._node = node
         self._worker = worker
         self._make = make
@@ -144,6 +156,7 @@ class FilteredTopic:
             self._stream_counters = {name: count + self._past_counters.get(name, 0)
                                      for name, count in current.items()}
         return {**self._stream_counters, "lost": self._subscription.lost + self.overflowed,
+                "other_publisher": self.other_publisher,
                 "late": self.late, "without_filter": self.unfiltered, "published": self.published}
 
     def take_queue_depth(self):
@@ -183,8 +196,13 @@ class FilteredTopic:
         self._past_counters, self._stream_counters = past, {**past, "waiting": 0}
         self.messages = None
 
-    def prepare(self, model, wishes):
-        """Design another model's filter while this one goes on; raises FracAccelError."""
+    @property
+    def rate_hz(self):
+        """Sampling rate [Hz] that a filter is needed for now; None where it is not known."""
+        return self.stream.sample_rate_hz if self._settled else None
+
+    def prepare(self, model, wishes, design=None):
+        """Make another model's filter, of this design if there is one; raises FracAccelError."""
         self._finish_task()
         self._candidate = None
         if self.messages is None and self._is_optional:
@@ -195,10 +213,9 @@ class FilteredTopic:
             if self.messages is None:
                 design = self._worker.submit(self._make, model, wishes)
             else:
-                design = self._worker.submit(self.stream.prepare, model, **wishes)
+                design = self._worker.submit(self.stream.prepare, model, design, **wishes)
             while not design.done():
-                self._subscription.drain()
-                time.sleep(_POLL_S)
+                self.take_in()
             self._candidate = design.result()
         finally:
             self._hold = False
@@ -212,6 +229,11 @@ class FilteredTopic:
             self._publish(self.messages.replace(model, wishes))
         self._advance()
 
+    def take_in(self):
+        """Take what has come, and wait a little: for whoever waits in the executor's thread."""
+        self._subscription.drain()
+        time.sleep(_POLL_S)
+
     def drain(self):
         """Filter what is waiting."""
         self._subscription.drain()
@@ -222,11 +244,24 @@ class FilteredTopic:
             if self._task.done():
                 self._collect()
             else:
-                self._subscription.drain()
-                time.sleep(_POLL_S)
+                self.take_in()
+
+    def _of_first(self, batch):
+        """Messages of the one publisher that is corrected."""
+        count, now_s = self._subscription.subscription.get_publisher_count(), time.monotonic()
+        if count <= 1:
+            last = batch[-1]
+            self.tracks.alone(_frame_of(last.data), last.sequence, now_s)
+            return batch
+        kept = [message for message in batch
+                if self.tracks.is_first(_frame_of(message.data), message.sequence, now_s)]
+        if not self._takes_first:
+            kept = []
+        self.other_publisher += len(batch) - len(kept)
+        return kept
 
     def _on_messages(self, batch):
-        self._intake += batch
+        self._intake += self._of_first(batch)
         if len(self._intake) > _MOST_HELD:
             self.overflowed += len(self._intake) - _MOST_HELD
             del self._intake[:-_MOST_HELD]
@@ -280,12 +315,13 @@ class FilteredTopic:
         task, self._task = self._task, None
         try:
             result = task.result()
-        except FracAccelError as error:
-            self.failure = str(error)
+        except Exception as error:  # a model must not end the node
+            self.failure = (str(error) if isinstance(error, FracAccelError)
+                            else f"{type(error).__name__} in the design")
             if self.messages is not None:
                 self.unfiltered += self.stream.counters["waiting"]
                 self.messages = None
-            self._node.get_logger().error(f"{self.name}: {error}")
+            self._node.get_logger().error(f"{self.name}: {self.failure}")
             return
         if self.messages is None:
             self._use(result)
@@ -296,5 +332,15 @@ class FilteredTopic:
     def _publish(self, processed):
         publish_serialized(self._publisher, processed.messages)
         self.published += len(processed.messages)
+        if processed.messages:
+            self.last_published_s = time.monotonic()
         if self._on_processed:
             self._on_processed(processed, time.time_ns())
+
+
+def _frame_of(message):
+    """Frame of a serialised message; empty where it cannot be read."""
+    try:
+        return cdr.read_header(message).frame_id
+    except FracAccelError:
+        return ""

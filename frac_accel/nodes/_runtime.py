@@ -187,11 +187,15 @@ def normalised(data: bytes, message_class: type) -> bytes:
 
 
 class RawMessage(NamedTuple):
-    """A serialised message and its times: sent by the publisher, taken in here."""
+    """A serialised message, its times (sent by the publisher, taken in here) and its number.
+
+    Every publisher counts its own messages; None where the middleware does not tell.
+    """
 
     data: bytes
     source_time_ns: int
     received_time_ns: int
+    sequence: int | None = None
 
 
 class RawSubscription:
@@ -294,7 +298,7 @@ class RawSubscription:
                 self.lost += sequence - last - 1
             self._last_sequence = sequence
         received = info["received_timestamp"] or time.time_ns()
-        return RawMessage(data, info["source_timestamp"] or received, received)
+        return RawMessage(data, info["source_timestamp"] or received, received, sequence)
 
     def _waiting(self) -> list[RawMessage]:
         batch: list[RawMessage] = []

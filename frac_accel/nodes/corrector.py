@@ -1,10 +1,8 @@
 """Node ``corrector``: raw acceleration in, corrected acceleration with a covariance out."""
 
 import gc
-import hashlib
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
@@ -14,11 +12,18 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from frac_accel import cdr, correction, health
+from frac_accel.correction.apart import design_apart
+from frac_accel.correction.stream import ON_FAULT
 from frac_accel.errors import FracAccelError
 from frac_accel.live_messages import BlockMessages, SampleMessages
 from frac_accel.live_metrics import Findings, LiveMetrics, Window, evaluate
 from frac_accel.model import SensorModel
-from frac_accel.nodes._filtered_topic import FilteredTopic, raw_qos, subscribe_temperature
+from frac_accel.nodes._filtered_topic import (
+    ON_TWO_PUBLISHERS,
+    FilteredTopic,
+    raw_qos,
+    subscribe_temperature,
+)
 from frac_accel.nodes._runtime import (
     FracAccelNode,
     NodeError,
@@ -46,9 +51,10 @@ class Corrector(FracAccelNode):
         self._declare_parameters()
         self.worker = ThreadPoolExecutor(1, "design")
         self._judge = ThreadPoolExecutor(1, "metrics")
+        self._loader = ThreadPoolExecutor(1, "load")
         model, self.model_hash = None, ""
         if self.value("model_file"):
-            model, self.model_hash = _load(self.value("model_file"))
+            model, self.model_hash = SensorModel.load_with_hash(self.value("model_file"))
         depth = self.value("depth")
         type_name = self.value("message_type")
         sample_class = import_message_class(type_name)
@@ -93,11 +99,38 @@ class Corrector(FracAccelNode):
             if channel is self._samples or counters.get("samples"):
                 counts = ", ".join(f"{name} {count}" for name, count in counters.items() if count)
                 print(f"{channel.topic.name}: {counts or 'nothing received'}", flush=True)
-        for worker in (self.worker, self._judge):
+        for worker in (self.worker, self._judge, self._loader):
             worker.shutdown()
 
     def _declare_parameters(self):
         self.declare("model_file", "", "sensor model (YAML) to correct with", read_only=False)
+        self.declare("allow_model_changes", True,
+                     "whether model_file and the wishes for the filter may change while it runs")
+        self.declare("design_deadline_s", 10.0,
+                     "longest time that loading another model and designing its filter may take",
+                     minimum=0.5, maximum=600.0)
+        self.declare("plausible_range", [0.0, 0.0],
+                     "lowest and highest raw value that can be true; both 0: the model's range, "
+                     "or what the record itself says")
+        on_fault = self.declare("on_fault", "covariance",
+                                "output while an axis is dead, stuck, saturated or held: "
+                                "covariance (one that nothing trusts), drop (none) or report (as "
+                                "ever)")
+        others = self.declare("on_two_publishers", "first",
+                              "raw topic with two publishers: first (the other is dropped) or none")
+        for name, value, words in (("on_fault", on_fault, ON_FAULT),
+                                   ("on_two_publishers", others, ON_TWO_PUBLISHERS)):
+            if value not in words:
+                raise NodeError(f"parameter '{name}' must be {' or '.join(words)}, got {value!r}")
+        if len(self.value("plausible_range")) != 2:
+            raise NodeError("parameter 'plausible_range' must be two numbers, got "
+                            f"{list(self.value('plausible_range'))}")
+        self.declare("largest_rate", 0.0,
+                     "largest rate of change of the raw signal that is no fault [1/s]; 0: any",
+                     minimum=0.0, maximum=1e15)
+        self.declare("stale_after_s", 0.5,
+                     "time without a corrected sample after which the output counts as stale",
+                     minimum=0.01, maximum=3600.0)
         self.declare("sample_rate_hz", 0.0,
                      "sampling rate of the sensor; 0: estimated from the first hundred stamps",
                      minimum=0.0, maximum=1e8)
@@ -142,8 +175,11 @@ class Corrector(FracAccelNode):
 
     def make_stream(self, model, wishes):
         """Stream of one topic."""
-        return correction.Corrector(model, self.value("sample_rate_hz"),
-                                    noise_std=self.value("noise_std") or None, **wishes)
+        stated = tuple(self.value("plausible_range"))
+        return correction.Corrector(
+            model, self.value("sample_rate_hz"), noise_std=self.value("noise_std") or None,
+            plausible_range=stated if any(stated) else None, on_fault=self.value("on_fault"),
+            largest_rate=self.value("largest_rate"), **wishes)
 
     def _on_parameters(self, parameters):
         changed = {p.name: p.value for p in parameters if p.name in _DESIGN_PARAMETERS}
@@ -153,30 +189,47 @@ class Corrector(FracAccelNode):
         if not model_file:
             return SetParametersResult(successful=False, reason="model_file: empty, expected the "
                                                                 "name of a sensor model")
-        try:
-            self._exchange(model_file, self._wishes(changed))
-        except FracAccelError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+        reason = self._refusal(model_file, self._wishes(changed))
+        return SetParametersResult(successful=not reason, reason=reason)
 
     def _on_reload(self, _, response):
-        try:
-            if not self.value("model_file"):
-                raise NodeError("no model to reload: set the parameter model_file")
-            self._exchange(self.value("model_file"), self._wishes())
-            response.success, response.message = True, f"{self.value('model_file')} is in use"
-        except FracAccelError as error:
-            response.success, response.message = False, str(error)
+        model_file = self.value("model_file")
+        reason = (self._refusal(model_file, self._wishes()) if model_file else
+                  "no model to reload: set the parameter model_file")
+        response.success, response.message = not reason, reason or f"{model_file} is in use"
         return response
+
+    def _refusal(self, model_file, wishes):
+        """Go on with a model and wishes; or why not, with nothing changed."""
+        if not self.value("allow_model_changes"):
+            return "allow_model_changes is false: the model stays as it was at the start"
+        try:
+            self._exchange(model_file, wishes)
+        except FracAccelError as error:
+            return str(error)
+        except Exception as error:  # a model must not end the node
+            self.get_logger().error(f"{model_file}: {type(error).__name__}: {error}")
+            return f"{model_file}: cannot be used: {type(error).__name__}"
+        return ""
 
     def _exchange(self, model_file, wishes):
         """Go on with a model and wishes; where they are bad, raise and change nothing."""
-        model, model_hash = _load(model_file)
-        for channel in self._channels:
-            channel.topic.prepare(model, wishes)
+        topics = [channel.topic for channel in self._channels]
+        rates = {topic.rate_hz or self.value("sample_rate_hz") or None for topic in topics} - {None}
+        # in a process of its own: this one must not wait for it
+        attempt = self._loader.submit(design_apart, model_file, rates, wishes,
+                                      self.value("design_deadline_s"))
+        while not attempt.done():
+            for topic in topics:
+                topic.take_in()
+            if time.monotonic() - self._tick_s > _PERIOD_S:
+                self._tick()
+        model, model_hash, designs = attempt.result()
+        for topic in topics:
+            topic.prepare(model, wishes, designs.get(topic.rate_hz))
         self.model_hash = model_hash
-        for channel in self._channels:
-            channel.topic.replace(model, wishes)
+        for topic in topics:
+            topic.replace(model, wishes)
         self.get_logger().info(f"{model_file} (sha256 {model_hash}) is in use")
 
     def _on_reference(self, batch):
@@ -231,11 +284,12 @@ class _Channel:
         self._findings = Findings()
         self._counters = {}
         self._newest_stamp_ns = None
+        self._alone = ()
         self._other_rate_periods = 0
         self.topic = FilteredTopic(
             node, message_class, topics, node.value("depth"), node.worker,
             lambda model, wishes: make_messages(node.make_stream(model, wishes)), is_optional,
-            self._on_processed)
+            self._on_processed, node.value("on_two_publishers"))
 
     def _on_processed(self, processed, now_ns):
         self._metrics.add(processed.raw, processed.stamps_ns, processed.values,
@@ -277,10 +331,20 @@ class _Channel:
         self._counters = counters
         silent_s = (None if topic.last_message_s is None
                     else time.monotonic() - topic.last_message_s)
-        design = self._design
+        stale_s = (None if topic.last_published_s is None
+                   else time.monotonic() - topic.last_published_s)
+        design, publishers = self._design, self._publishers()
+        if len(publishers) == 1:
+            self._alone = publishers
         level, message = health.judge(health.Situation(
+            stale_s=stale_s, stale_after_s=self._node.value("stale_after_s"),
+            faults=topic.stream.faults if topic.rate_hz else ("",) * 3,
+            on_fault=self._node.value("on_fault"),
+            other_publishers=tuple(p.node for p in publishers if p not in self._alone),
+            frames=(topic.tracks.first_frame, topic.tracks.other_frame),
+            takes_first=self._node.value("on_two_publishers") == "first",
             topic=topic.name, model_file=self._node.value("model_file"), failure=topic.failure,
-            designing=topic.designing, publishers=self._publishers(),
+            designing=topic.designing, publishers=publishers,
             refused_subscribers=self._refused_subscribers(),
             seconds_since_message=silent_s,
             stated_rate_hz=self._node.value("sample_rate_hz"),
@@ -344,12 +408,6 @@ class _Channel:
                 name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
                 result.append(f"{name} ({reason.strip().rstrip(';')})")
         return tuple(result)
-
-
-def _load(model_file):
-    """Model of a file, and the file's hash."""
-    model = SensorModel.load(model_file)
-    return model, hashlib.sha256(Path(model_file).read_bytes()).hexdigest()
 
 
 def _in_short(design):
