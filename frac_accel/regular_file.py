@@ -16,7 +16,8 @@ def open_regular(path):
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise OSError(0, "is not a regular file", str(path))
+            kind = "it is a directory" if os.path.isdir(path) else "it is not a regular file"
+            raise OSError(0, kind, str(path))
         return open(descriptor, "rb")
     except BaseException:
         os.close(descriptor)
