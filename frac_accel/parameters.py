@@ -91,7 +91,7 @@ def coefficients():
 
 def choice(*words):
     """Declare a word of an effect, one of those given; no fit varies it."""
-    return dataclasses.field(metadata={"choices": words, "unit": ""})
+    return dataclasses.field(metadata={"choices": words, "unit": "1"})
 
 
 def is_varied(field):

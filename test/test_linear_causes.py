@@ -6,6 +6,7 @@ sine, so that no simulation has a part in them.
 
 import numpy as np
 import pytest
+import real_records
 from exact_sines import RATE, oscillator, record, samples
 from scipy import signal
 
@@ -187,3 +188,28 @@ def test_alternatives_are_of_the_same_cause_and_end(cause):
             to_come += one.alternatives()
     assert len(seen) == {"linear_phase_filter": 4, "low_pass_filter": 14,
                          "second_resonance": 1}[cause]
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_a_delay_does_not_hide_the_filter(given):
+    """A delay takes the filter's own delay at first, and has to give it back."""
+    pair = record(np.random.default_rng(11), lambda s: 1.02 * moving_averages(s, 2.01e-3, 1)
+                  * time_delay(s, 5.06e-4), band=(2.0, 250.0), noise=2e-3)
+    in_use = model({"type": "gain", "sensitivity": 1.02}) if given else None
+    found = diagnose(samples(*pair), in_use)
+    assert {finding.cause for finding in found.findings} == {"time_delay", "linear_phase_filter"}
+    own = found.model.axis("x")
+    assert own.delay_s == pytest.approx(1.511e-3, abs=2e-6)
+    assert {effect.cause: effect for effect in own.effects}["linear_phase_filter"].length_s \
+        == pytest.approx(2.01e-3, rel=2e-3)
+
+
+@pytest.mark.real_data
+@pytest.mark.skipif(not real_records.FOLDER.is_dir(), reason="no measured records here")
+def test_a_measured_digital_filter_is_named_and_nothing_else():
+    found = diagnose(real_records.FOLDER / "mpu9250_response.mcap")
+    assert {finding.cause for finding in found.findings} == {"time_delay", "linear_phase_filter"}
+    own = found.model.axis("x")
+    assert own.delay_s == pytest.approx(1.511e-3, abs=1e-5)
+    assert {effect.cause: effect for effect in own.effects}["linear_phase_filter"].length_s \
+        == pytest.approx(2.01e-3, rel=1e-2)

@@ -20,6 +20,7 @@ from ..record.orientation import Orientation, turned_away
 from ..simulation import AxisSimulator
 from ..sources import pair_of
 from .engine import Engine
+from .flat import flat_instead
 from .judgement import Diagnosis, Finding, insufficient, judge
 from .leftover import related
 from .spikes import spikes
@@ -121,7 +122,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
             require_excitation(record.reference[:, column], record.sampling_rate_hz, _COEFFICIENTS)
         except IdentificationError as error:
             return insufficient(str(error), model, found)
-        model, stds, seed = _classical(record, axis, used)
+        model, stds, seed = _classical(record, axis, used, limit)
     else:
         stds = _stated(model, axis)
     # the common lag of the stamps is a median of scattered ones
@@ -170,13 +171,21 @@ def _shown(found, measured):
     return {cause: effect for cause, effect in effects.items() if effect is not None}
 
 
-def _classical(record, axis, used):
+def _classical(record, axis, used, limit):
     """Classical core (a gain where no resonance shows) identified from the record, what it knows
     of it (nothing, since any cause has bent it), and the effects that it was identified with."""
     from ..identification import identify
     model = identify(dataclasses.replace(record, valid=used), axis, "classical").model
-    return (SensorModel(model.core), dict.fromkeys(_CORE, np.inf),
-            {effect.cause: effect for effect in model.effects})
+    stds = dict.fromkeys(_CORE, np.inf)
+    core, seed = SensorModel(model.core), {effect.cause: effect for effect in model.effects}
+
+    def opened(model):
+        return {cause: entry.effect
+                for cause, entry in _left_open(model.axis(axis), stds, 0.0).items()}
+    if isinstance(core.core, Oscillator):
+        core, seed = flat_instead(record, AXES.index(axis), used, core, opened, seed, limit) \
+            or (core, seed)
+    return core, stds, seed
 
 
 def _stated(model, axis):

@@ -134,7 +134,7 @@ class Engine:
                     self.uncontested.add(cause)
                     continue
                 less = self.search.without(best, cause, best.cost + self.threshold(best))
-                self.search.fit_all([{**less.effects, rival: begin} for _, rival, begin in
+                self.search.fit_all([self.search.begun(less, rival, begin) for _, rival, begin in
                                      self.search.screen(less)[:_RIVALS] if rival != cause]
                                     + [best.effects])
             variance = best.cost / self.problem.count

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from ..effects import known_effects
+from ..effects import IDENTIFIED, known_effects
 from ..errors import FracAccelError
 from ..parameters import fixed_values
 from .problem import acts_on_spring
@@ -55,7 +55,7 @@ class Search:
         self.problem, self.base = problem, base or {}
         self.candidates = candidates
         self.fits = {}
-        self.screens = {}
+        self.screens, self._lags = {}, {}
         self.log = log or (lambda words: None)
 
     def fit(self, effects):
@@ -85,9 +85,13 @@ class Search:
             try:
                 # a linear motion is cheap enough to be tried in any case
                 costly = any(map(acts_on_spring, effects.values()))
-                trials[key] = self.fits.get(key) or self.problem.fit(
-                    effects, _TRIAL, True, _HOPELESS * best,
-                    min(goal, self._near(best)) if costly else np.inf)
+                known = self.fits.get(key)
+                if known is None or _kinds(known.effects) != _kinds(effects):
+                    # with an order that other sets found, a known set may do better
+                    trial = self.problem.fit(effects, _TRIAL, True, _HOPELESS * best,
+                                             min(goal, self._near(best)) if costly else np.inf)
+                    known = trial if known is None or trial.cost < known.cost else known
+                trials[key] = known
             except FracAccelError:
                 continue  # a motion without bound describes no record
             best = min(best, trials[key].cost)
@@ -111,9 +115,14 @@ class Search:
             for cause, effect in fit.effects.items():
                 for other in effect.alternatives():
                     kind = cause, *fixed_values(other).values()
-                    if kind not in tried:
-                        tried.add(kind)
+                    if kind in tried or self.problem.limit.ends_search(
+                            "some orders of filters were not tried"):
+                        continue
+                    tried.add(kind)
+                    try:
                         others.append(self.problem.fit({**fit.effects, cause: other}))
+                    except FracAccelError:
+                        continue
             better = min(others, key=lambda other: other.cost, default=fit)
             if better.cost >= fit.cost:
                 return fit
@@ -143,14 +152,28 @@ class Search:
         for cause in self.candidates:
             if cause in fitted.effects:
                 continue
-            options = [self._option(start, fitted, cause, known)
+            options = [(self._option(start, fitted, cause, known), start.lag_s)
                        for start in known_effects()[cause].starts(view)]
-            best = min((option for option in options if option), key=lambda option: option[0],
-                       default=None)
+            best, lag_s = min((entry for entry in options if entry[0]),
+                              key=lambda entry: entry[0][0], default=(None, 0.0))
             if best:
                 found.append(best)
+                self._lags[fitted.causes, cause] = lag_s
         self.screens[fitted.causes] = sorted(found, key=lambda entry: entry[0])
         return self.screens[fitted.causes]
+
+    def begun(self, fitted, cause, begin):
+        """Effects to begin with where a cause of `screen` joins a fit."""
+        lag_s = self._lags.get((fitted.causes, cause), 0.0)
+        return {**fitted.effects, **self._later(fitted.effects, lag_s), cause: begin}
+
+    def _later(self, effects, lag_s):
+        """The delay among some linear effects, by so much later; none where there is none."""
+        cause = IDENTIFIED["delay_s"].cause
+        if not lag_s or cause not in effects or any(map(acts_on_spring, effects.values())):
+            return {}
+        delay = effects[cause]
+        return {cause: dataclasses.replace(delay, delay_s=delay.delay_s + lag_s)}
 
     def _option(self, start, fitted, cause, known):
         """(Cost to be expected, cause, effect to begin with) of one start, or None."""
@@ -160,8 +183,11 @@ class Search:
         residual = fitted.residual - own @ (own.T @ fitted.residual)
         cost = float(residual @ residual)
         for effect in start.columns:
+            later = self._later(fitted.effects, start.lag_s)
             try:
-                change = p.clear(p.change(fitted.effects, cause, effect), fitted.free)
+                change = p.simulate({**fitted.effects, **later, cause: effect}) - fitted.simulated \
+                    if later else p.change(fitted.effects, cause, effect)
+                change = p.clear(change, fitted.free)
             except FracAccelError:
                 return None
             change = change - known @ (known.T @ change)
@@ -216,7 +242,7 @@ class Search:
                     key = parent.causes | {cause}
                     if parent.cost - cost > threshold(parent) and cost < least \
                             and (key not in wanted or cost < wanted[key][0]):
-                        wanted[key] = cost, {**parent.effects, cause: begin}
+                        wanted[key] = cost, self.begun(parent, cause, begin)
             chosen = sorted(wanted.values(), key=lambda entry: entry[0])[:_FITS]
             fits = self.fit_all([effects for _, effects in chosen])
             if not fits or best.cost - fits[0].cost < threshold(best):
@@ -254,6 +280,11 @@ class Search:
             # that fit had ended in another valley
             del self.fits[known.causes]
         return next(iter(self.fit_all([less], fitted.cost, goal)), None) or self.fit(less)
+
+
+def _kinds(effects):
+    """What no fit varies of some effects, by cause."""
+    return {cause: fixed_values(effect) for cause, effect in effects.items()}
 
 
 def _orthonormal(columns):

@@ -52,6 +52,8 @@ def check_effect(cls, seed=0):
     >>> frac_accel.check_effect(effect_of("offset"))
     """
     for number, (name, check) in enumerate(CHECKS.items()):
+        if not _applies(cls, check):
+            continue
         try:
             with np.errstate(all="ignore"):
                 check(cls, Draws([seed, number]))
@@ -60,6 +62,16 @@ def check_effect(cls, seed=0):
         except Exception as error:
             line = " ".join(str(error).split())
             raise ModelError(f"{_who(cls)}: {name}: {type(error).__name__}: {line}") from error
+
+
+def _applies(cls, check):
+    """A fault of the reference is no part of the sensor; lists of coefficients cannot be drawn."""
+    if check in (declaration.declares, declaration.documents):
+        return True
+    if any(field.metadata.get("list") for field in
+           getattr(cls, "__dataclass_fields__", {}).values()):
+        return False
+    return check.__module__ == declaration.__name__ or not getattr(cls, "of_reference", False)
 
 
 def _who(cls):

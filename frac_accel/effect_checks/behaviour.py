@@ -68,7 +68,7 @@ def _raised(error, of, effect):
 
 def vanishes_at_null(cls, draws):
     """The output tends to that without the cause as its parameters tend to their null values."""
-    if all(field.metadata["null"] is None for field in parameter_fields(cls)):
+    if all(field.metadata.get("null") is None for field in parameter_fields(cls)):
         return
     n = 600
     for _ in range(_NULLS):
@@ -78,7 +78,7 @@ def vanishes_at_null(cls, draws):
         for distance in _DISTANCES:
             near = dataclasses.replace(effect, **{
                 field.name: _near_null(field, distance) for field in parameter_fields(cls)
-                if field.metadata["null"] is not None})
+                if field.metadata.get("null") is not None})
             output = _simulated(near, reference, temperature)
             if output is None:
                 raise Broken(f"cannot be simulated near its null value, with {words(near)}")

@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 
 from ..effects import effect_names, effect_of
-from ..effects.base import STAMPS, Effect
+from ..effects.base import REFERENCE, STAMPS, Effect
 from ..effects.fit_starts import Start
 from ..errors import FracAccelError
 from ..model import AXES, SensorModel
@@ -29,7 +29,7 @@ def declares(cls, draws):
         raise Broken("no frozen dataclass: put @dataclasses.dataclass(frozen=True) before it")
     if not re.fullmatch(r"[a-z][a-z0-9_]*", str(getattr(cls, "cause", ""))):
         raise Broken("`cause` is no name in small letters and underscores")
-    if getattr(cls, "stage", None) not in range(STAMPS + 1):
+    if getattr(cls, "stage", None) not in range(REFERENCE, STAMPS + 1):
         raise Broken("`stage` is none of the places in the signal's way (frac_accel.effects.base)")
     for name in ("explanation", "experiment"):
         if not str(getattr(cls, name, "")).endswith("."):
@@ -37,9 +37,10 @@ def declares(cls, draws):
     for field in dataclasses.fields(cls):
         if not field.metadata:
             raise Broken(f"`{field.name}` is not declared with `parameter`")
-        _complete(field)
+        if not field.metadata.keys() & {"list", "choices"}:
+            _complete(field)
     if not cls.read_off and parameter_fields(cls) \
-            and all(field.metadata["null"] is None for field in parameter_fields(cls)):
+            and all(field.metadata.get("null") is None for field in parameter_fields(cls)):
         raise Broken("no parameter declares `null`, the value with which it changes nothing")
     names = {field.name for field in parameter_fields(cls)}
     for axis in AXES:
@@ -84,7 +85,7 @@ def _complete(field):
 
 def row(cls):
     """The cause's row in the table of docs/effects.md."""
-    units = {field.name: field.metadata["unit"] for field in parameter_fields(cls)}
+    units = {field.name: field.metadata.get("unit", "1") for field in parameter_fields(cls)}
     parameters = ", ".join(f"`{name}`" + ("" if unit == "1" else f" [{unit}]")
                            for name, unit in units.items())
     return f"| `{cls.cause}` | {parameters} | {cls.explanation} |"
@@ -109,8 +110,10 @@ def survives_yaml(cls, draws):
     for _ in range(_DRAWS):
         effect = draws.any(cls)
         if registered:
-            text = yaml.safe_dump(SensorModel(CORE, [effect]).to_dict())
-            again = SensorModel.from_dict(yaml.safe_load(text)).effects[0]
+            own = {"reference_faults" if cls.of_reference else "effects": [effect]}
+            read = SensorModel.from_dict(yaml.safe_load(yaml.safe_dump(
+                SensorModel(CORE, **own).to_dict())))
+            again = (read.reference_faults if cls.of_reference else read.effects)[0]
         else:
             again = build(cls, yaml.safe_load(yaml.safe_dump(plain(as_mapping(effect)))), cls.cause)
         if again != effect:
@@ -135,7 +138,7 @@ def starts_within_bounds(cls, draws):
                 continue
         measured = measured + 1e-3 * draws.rng.normal(size=n)
         view = View(RATE, np.arange(n) / RATE, measured, simulated, measured - simulated,
-                    np.ones(n, bool), CORE, 0.0, float(np.std(measured)), True,
+                    np.ones(n, bool), CORE, 0.0, 0.0, float(np.std(measured)), True,
                     dict.fromkeys(AXES, True), "x")
         starts = cls.starts(view)
         if cls.read_off and starts:

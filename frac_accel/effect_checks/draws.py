@@ -6,7 +6,7 @@ from ..core import Oscillator
 from ..effects.base import Circumstances
 from ..errors import ModelError
 from ..model import AxisModel, SensorModel
-from ..parameters import Scales, as_mapping, build, parameter_fields
+from ..parameters import Scales, as_mapping, build, is_varied, parameter_fields
 
 RATE = 1000.0  # [Hz]
 # In band for the whole test sensor, and clear of the Nyquist frequency [shares of the rate].
@@ -43,12 +43,20 @@ class Draws:
 
     def _accepted(self, cls, value):
         for _ in range(_TRIES):
-            drawn = {field.name: float(value(field)) for field in parameter_fields(cls)}
+            drawn = {field.name: self._counted(field) if not is_varied(field)
+                     else float(value(field)) for field in parameter_fields(cls)}
             try:
                 return build(cls, drawn, cls.cause)
             except ModelError as error:
                 refusal = error
         raise Broken(f"none of {_TRIES} draws from the declared ranges is accepted: {refusal}")
+
+    def _counted(self, field):
+        """A word or a count that the field allows."""
+        if field.metadata.get("choices"):
+            return str(self.rng.choice(field.metadata["choices"]))
+        low, high = span(field)
+        return int(self.rng.integers(np.ceil(low), np.floor(high) + 1))
 
     def _usual(self, field):
         if field.metadata["null"] == "core":

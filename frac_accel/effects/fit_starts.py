@@ -29,12 +29,16 @@ class Start(NamedTuple):
         or weaker.
     parameter : str or None
         What a screened factor scales.
+    lag_s : float
+        What a delay that is there already has to take on [s], where there is one: before, it may
+        have stood for that of this effect.
     """
 
     effect: object
     columns: tuple
     kind: str
     parameter: str | None = None
+    lag_s: float = 0.0
 
 
 def free(effect, parameter=None):
@@ -88,7 +92,7 @@ def spectral_peaks(view, count=3):
 
 
 def matching(view, links, count=2):
-    """The linear links that come nearest to what is between simulated and measured output.
+    """Starts of the linear links that come nearest to what is between simulated and measured.
 
     Their responses are compared with the averaged ratio of the two, where there is power: as they
     are, and with any gain and a further delay, which another cause may have to give.
@@ -102,7 +106,7 @@ def matching(view, links, count=2):
 
     Returns
     -------
-    list of Effect
+    list of Start
     """
     from scipy.signal import csd, welch
     size = min(_LONGEST_SEGMENT, max(64, len(view.measured) // 8))
@@ -116,12 +120,13 @@ def matching(view, links, count=2):
     responses = np.array([link.transfer_function(s) * np.exp(-s * link.pure_delay_s())
                           for link in links])
     plain = np.abs(responses - ratio)**2 @ weight
-    delays = np.exp(np.outer(s, np.linspace(-_MOST_DELAY, _MOST_DELAY, 8 * _MOST_DELAY + 1)
-                             / view.rate))
-    shared = np.max(np.abs(np.real((np.conj(responses) * ratio * weight) @ delays)), axis=1)
-    free_of_gain = -shared**2 / (np.abs(responses)**2 @ weight)
-    best = [*np.argsort(plain)[:count], *np.argsort(free_of_gain)[:count]]
-    return [links[i] for i in dict.fromkeys(best)]
+    delays = np.linspace(-_MOST_DELAY, _MOST_DELAY, 16 * _MOST_DELAY + 1) / view.rate
+    turned = np.exp(np.outer(s, delays))
+    shared = np.abs(np.real((np.conj(responses) * ratio * weight) @ turned))
+    explained = np.max(shared, axis=1)**2 / (np.abs(responses)**2 @ weight)
+    lag = delays[np.argmax(shared, axis=1)]
+    return [finite(links[i]) for i in np.argsort(plain)[:count]] + [
+        finite(links[i])._replace(lag_s=float(lag[i])) for i in np.argsort(-explained)[:count]]
 
 
 def strongest_line(view):

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import CONDITIONER, Effect
-from .fit_starts import finite, matching
+from .fit_starts import matching
 
 _MOST = 4
 
@@ -52,6 +52,6 @@ class LinearPhaseFilter(Effect):
 
     @classmethod
     def starts(cls, view):
-        return [finite(link) for link in matching(view, [
-            cls(length, order) for length in np.geomspace(0.3, 100, 80) / view.rate
-            for order in range(1, _MOST + 1)])]
+        return matching(view, [
+            cls(float(length), order) for length in np.geomspace(0.3, 100, 80) / view.rate
+            for order in range(1, _MOST + 1)])

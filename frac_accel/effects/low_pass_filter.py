@@ -8,7 +8,7 @@ import numpy as np
 
 from ..parameters import choice, parameter
 from .base import CONDITIONER, Effect
-from .fit_starts import finite, matching
+from .fit_starts import matching
 
 _FAMILIES = ("butterworth", "bessel")
 _LEAST, _MOST = 2, 8
@@ -52,9 +52,9 @@ class LowPassFilter(Effect):
 
     @classmethod
     def starts(cls, view):
-        return [finite(link) for link in matching(view, [
-            cls(corner, order, family) for corner in view.rate * np.geomspace(0.01, 2.0, 40)
-            for order in range(_LEAST, _MOST + 1) for family in _FAMILIES])]
+        return matching(view, [
+            cls(float(corner), order, family) for corner in view.rate * np.geomspace(0.01, 2.0, 40)
+            for order in range(_LEAST, _MOST + 1) for family in _FAMILIES])
 
 
 @functools.cache
