@@ -352,7 +352,7 @@ def test_a_pipe_is_refused_instead_of_waited_for(tmp_path, name):
 
 
 def test_a_device_is_no_bag():
-    with pytest.raises(BagError, match="/dev/zero: cannot be read: is not a regular file"):
+    with pytest.raises(BagError, match="/dev/zero: cannot be read: it is not a regular file"):
         BagReader("/dev/zero")
 
 

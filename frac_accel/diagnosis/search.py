@@ -24,6 +24,8 @@ _HOPELESS = 4.0
 _BEHIND = 2.0
 # Fits whose arrays are kept; those of others are made again when asked for.
 _AT_HAND = 8
+# Samples by which causes are screened, where a record has more.
+_SCREENED = 6000
 # Variances from the best fit of a round within which a fit must come if it goes on as it goes.
 _NEAR = 200.0
 
@@ -110,9 +112,15 @@ class Search:
     def _varied(self, fit):
         """The best of a fit and its like with another of what no fit varies, such as an order."""
         tried = set()
+        # in a smaller set its like has been compared already
+        known = {cause for smaller in self.fits.values() if smaller.causes < fit.causes
+                 for cause, effect in smaller.effects.items()
+                 if fixed_values(effect) == fixed_values(fit.effects[cause])}
         while True:
             others = []
             for cause, effect in fit.effects.items():
+                if cause in known:
+                    continue
                 for other in effect.alternatives():
                     kind = cause, *fixed_values(other).values()
                     if kind in tried or self.problem.limit.ends_search(
@@ -148,11 +156,14 @@ class Search:
         if fitted.causes in self.screens:
             return self.screens[fitted.causes]
         view, found = self.view(fitted), []
-        known = _orthonormal(fitted.jacobian)
+        rows, share = self._screened_rows()
+        known = _orthonormal(np.hstack([fitted.free[rows], fitted.jacobian[rows]]))
         for cause in self.candidates:
             if cause in fitted.effects:
                 continue
-            options = [(self._option(start, fitted, cause, known), start.lag_s)
+            if self.problem.limit.ends_search("some causes were not screened"):
+                break
+            options = [(self._option(start, fitted, cause, known, rows, share), start.lag_s)
                        for start in known_effects()[cause].starts(view)]
             best, lag_s = min((entry for entry in options if entry[0]),
                               key=lambda entry: entry[0][0], default=(None, 0.0))
@@ -175,36 +186,48 @@ class Search:
         delay = effects[cause]
         return {cause: dataclasses.replace(delay, delay_s=delay.delay_s + lag_s)}
 
-    def _option(self, start, fitted, cause, known):
+    def _screened_rows(self):
+        """Samples by which causes are screened, and how many of those that count each stands for.
+
+        All where they are few; otherwise some at random, which no period can mislead.
+        """
+        rows = np.flatnonzero(self.problem.used)
+        count = len(rows)
+        if count > _SCREENED:
+            rows = np.sort(np.random.default_rng(0).choice(rows, _SCREENED, replace=False))
+        return rows, count / len(rows)
+
+    def _option(self, start, fitted, cause, known, rows, share):
         """(Cost to be expected, cause, effect to begin with) of one start, or None."""
         p, changes = self.problem, []
-        own = p.own_motions(start.effect)
-        own = _orthonormal(p.clear(own - known @ (known.T @ own), fitted.free))
-        residual = fitted.residual - own @ (own.T @ fitted.residual)
-        cost = float(residual @ residual)
+        own = p.own_motions(start.effect)[rows]
+        own = _orthonormal(own - known @ (known.T @ own))
+        known = np.hstack([known, own])
+        residual = fitted.residual[rows]
+        residual = residual - known @ (known.T @ residual)
+        cost = share * float(residual @ residual)
         for effect in start.columns:
             later = self._later(fitted.effects, start.lag_s)
             try:
                 change = p.simulate({**fitted.effects, **later, cause: effect}) - fitted.simulated \
                     if later else p.change(fitted.effects, cause, effect)
-                change = p.clear(change, fitted.free)
             except FracAccelError:
                 return None
-            change = change - known @ (known.T @ change)
-            changes.append(change - own @ (own.T @ change))
+            change = change[rows]
+            changes.append(change - known @ (known.T @ change))
         if len(changes) > 1:
             basis = _orthonormal(np.stack(changes, axis=1))
-            explained = float(np.sum((basis.T @ residual)**2))
+            explained = share * float(np.sum((basis.T @ residual)**2))
             return cost - explained, cause, start.effect
         size, shared = changes[0] @ changes[0], changes[0] @ residual
-        if size <= 1e-24 * cost:
+        if not np.isfinite(size) or size <= 1e-24 * cost:
             return None
         factor = shared / size
         if start.kind in ("positive", "weak") and factor <= 0:
             return None
         if start.kind in ("finite", "weak"):
             factor = np.clip(factor, _REACH[0] if start.kind == "finite" else 0.0, _REACH[1])
-        cost += factor**2 * size - 2 * factor * shared
+        cost += share * (factor**2 * size - 2 * factor * shared)
         effect = start.effect
         if start.parameter:
             scaled = factor * getattr(effect, start.parameter)
