@@ -26,6 +26,8 @@ LOSSY = ("clipping", "dead_zone", "quantization", "dropped_samples", "timestamp_
 FORCES = ("stiffness_drift", "quadratic_damping", "impact_stop")
 # in test_misalignment
 TURNED = ("misalignment",)
+# in test_backlash
+PATH = ("backlash",)
 # in test_residual_causes
 BY_POWER = ("sampling_jitter", "interference_bursts")
 
@@ -35,7 +37,7 @@ def test_every_effect_of_this_package_is_tested_here():
             if effect.__module__.startswith("frac_accel.")}
     assert ours == {*LINEAR, *ON_SAMPLES, *NONLINEAR, *CORE, *IN_TIME, *LOSSY,
                     *CHANGING, *FORCES, *TURNED,
-                    *BY_POWER}
+                    *BY_POWER, *PATH}
 
 
 @pytest.mark.parametrize("cause", rig.CAUSES)
