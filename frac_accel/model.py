@@ -68,6 +68,12 @@ class AxisModel:
         return any(type(effect).base_gain is not Effect.base_gain for effect in self.effects)
 
     @property
+    def path_dependent(self):
+        """Effects that change the core's motion on its way to the links behind."""
+        return tuple(effect for effect in self.effects
+                     if type(effect).change_motion is not Effect.change_motion)
+
+    @property
     def delay_s(self):
         """Sum of the pure delays [s]: the value stamped t belongs to t - delay_s."""
         return sum(effect.pure_delay_s() for effect in self.effects)

@@ -20,6 +20,9 @@ _REFINED = 4
 # natural period.
 _STEPS_PER_SAMPLE = 8
 _MOST_STEPS_PER_SAMPLE = 64
+# Points in each sampling interval at which a path is followed: a turn of the largest motion must be
+# known far better than the smallest play.
+_PATH_STEPS = 16
 # With fewer steps the modes of a fractional memory need not be finer.
 _FEW_STEPS = 4
 # Samples that a response between samples needs after the last one.
@@ -214,7 +217,7 @@ class AxisSimulator:
         delay_s = axis_model.delay_s + late_s - self._lag_s - (ratio - 1) * self._start_time_s
         result = self._linear(axis_model, delay_s, ratio)
         force = axis_model.static_force
-        if force and not (self._still and not self._level):
+        if (force or axis_model.path_dependent) and not (self._still and not self._level):
             result += self._deviation(axis_model, force, delay_s, ratio)
         return result
 
@@ -234,32 +237,39 @@ class AxisSimulator:
         return at_positions(fine, _REFINED * position) + level
 
     def _deviation(self, model, force, delay_s, ratio):
-        """What the spring's force beyond its linear part adds."""
+        """What the spring's force beyond its linear part adds, and what depends on the path."""
         try:
             from .core import nonlinear_motion
         except ImportError as error:
             raise FracAccelError(f"a model with a nonlinear spring or friction needs numba to be "
                                  f"simulated: pip install numba ({error})") from None
         core = model.effective_core
-        natural = 2 * np.pi * core.natural_frequency_hz
-        highest = core.natural_frequency_hz * np.sqrt(1 + force.slope)
+        natural = 2 * np.pi * core.natural_frequency_hz if force else 0.0
+        highest = natural / (2 * np.pi) * np.sqrt(1 + force.slope)
         wanted = self._least_steps * max(1.0, 3 * highest / self._rate)
+        if model.path_dependent:
+            wanted = max(wanted, _PATH_STEPS)
         steps = int(np.ceil(min(wanted, _MOST_STEPS_PER_SAMPLE)))
         position = ratio * np.arange(self._n) - delay_s * self._rate
         count = int(max(position[-1], self._n)) + _BEYOND
         self._prepared(delay_s)
         links = (core, *(effect for effect in model.dynamics[1:] if effect.stage < CORE))
-        load = self._level * core.sensitivity
-        orders = nonlinear_motion.derivatives_needed(force) + 1
+        load = self._level * core.sensitivity if force else 0.0
+        orders = nonlinear_motion.derivatives_needed(force) + 1 if force else 1
         known_by = links, natural, orders, steps, count
         motion, modes = kept(self._motions, known_by, self._core_motion, *known_by, most=1)
-        start = force.equilibrium(load) - load
-        deviation = kept(self._deviations, (known_by, force), nonlinear_motion.deviation, modes,
-                         force, natural / (self._rate * steps), motion, start,
-                         natural * self._start_time_s)
+        start, deviation = 0.0, np.zeros(motion.shape[1])
+        if force:
+            start = force.equilibrium(load) - load
+            deviation = kept(self._deviations, (known_by, force), nonlinear_motion.deviation,
+                             modes, force, natural / (self._rate * steps), motion, start,
+                             natural * self._start_time_s)
         if not np.isfinite(deviation[-1]):
             raise FracAccelError("the model's motion grows without bound: its nonlinear terms are "
                                  "too large for this record")
+        for effect in model.path_dependent:
+            passed = motion[0] + deviation
+            deviation = deviation + effect.change_motion(passed) - passed
         behind = [effect for effect in model.dynamics[1:] if effect.stage > CORE]
         moving = deviation - start
         filtering = [effect for effect in behind if effect.stage < GAIN]
@@ -280,8 +290,12 @@ class AxisSimulator:
         motion = np.empty((orders, steps * count))
         for order in range(orders):
             motion[order] = convolution.response_between(transfer, steps, steps * count)
-            transfer = transfer * (convolution.s / natural)
-        motion[0] += self._level * links[0].sensitivity
+            if order < orders - 1:
+                transfer = transfer * (convolution.s / natural)
+        if self._level:
+            motion[0] += self._level * _static_gain(lambda s: _product(links, s))
+        if not natural:
+            return motion, None
         return motion, modes_of(links[0], self._rate / count,
                                 natural + np.pi * self._rate * steps,
                                 coarse=self._least_steps < _FEW_STEPS)

@@ -26,13 +26,18 @@ LOSSY = ("clipping", "dead_zone", "quantization", "dropped_samples", "timestamp_
 FORCES = ("stiffness_drift", "quadratic_damping", "impact_stop")
 # in test_misalignment
 TURNED = ("misalignment",)
+# in test_backlash
+PATH = ("backlash",)
+# in test_residual_causes
+BY_POWER = ("sampling_jitter", "interference_bursts")
 
 
 def test_every_effect_of_this_package_is_tested_here():
     ours = {cause for cause, effect in known_effects().items()
             if effect.__module__.startswith("frac_accel.")}
     assert ours == {*LINEAR, *ON_SAMPLES, *NONLINEAR, *CORE, *IN_TIME, *LOSSY,
-                    *CHANGING, *FORCES, *TURNED}
+                    *CHANGING, *FORCES, *TURNED,
+                    *BY_POWER, *PATH}
 
 
 @pytest.mark.parametrize("cause", rig.CAUSES)

@@ -236,6 +236,9 @@ def design_simulator(model, sampling_rate_hz, tolerance=TOLERANCE):
     if any(axis.static_force for axis in model.axes):
         raise DesignError("a model with a nonlinear spring or friction cannot be played live; "
                           "simulate it offline")
+    if any(axis.path_dependent for axis in model.axes):
+        raise DesignError("a model whose output depends on the path of the motion cannot be played "
+                          "live; simulate it offline")
     # a sensor whose stamps are early (a negative delay) can only be played so much later
     wait = int(np.ceil(max(0.0, *(-axis.delay_s * rate for axis in model.axes))))
 

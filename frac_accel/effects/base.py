@@ -243,6 +243,13 @@ class Effect:
         """
         return 1.0
 
+    def change_motion(self, motion):
+        """What this effect passes on of the core's motion, both shape (n,), finely sampled.
+
+        It begins at rest. Of effects at the stage `CORE` that depend on the path.
+        """
+        return motion
+
     def transfer_function(self, s):
         """Linear link's transfer function at complex `s` [rad/s], without its pure delay."""
         return np.ones_like(s, dtype=complex)

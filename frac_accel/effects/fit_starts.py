@@ -13,6 +13,8 @@ _LONGEST_SEGMENT = 1024
 _MOST_DELAY = 8
 # Samples that must count on either side of an instant at which something is to have changed.
 _SIDE = 32
+# Share of a record at either end in which a change cannot be told from one that was always there.
+_END = 0.05
 
 
 class Start(NamedTuple):
@@ -167,7 +169,8 @@ def jumps(view, shape):
     shared = np.cumsum(np.where(view.used, view.residual * shape, 0.0))
     power = np.cumsum(np.where(view.used, shape**2, 0.0))
     count = np.cumsum(view.used)
-    inner = np.flatnonzero((count[:-1] >= _SIDE) & (count[-1] - count[:-1] >= _SIDE)
+    side = max(_SIDE, _END * count[-1])
+    inner = np.flatnonzero((count[:-1] >= side) & (count[-1] - count[:-1] >= side)
                            & (power[:-1] > 0) & (power[:-1] < power[-1]))
     if not len(inner):
         return []

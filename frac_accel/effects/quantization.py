@@ -7,6 +7,9 @@ import numpy as np
 from ..parameters import parameter
 from .base import QUANTIZATION, Effect, Reading
 
+# Largest share of an error's power that is ascribed to rounding.
+_MOST = 0.99
+
 
 @dataclasses.dataclass(frozen=True)
 class Quantization(Effect):
@@ -25,10 +28,19 @@ class Quantization(Effect):
         return cls(found.step) if found.step else None
 
     def reading(self, seen):
+        """Where noise is rounded too, rounding the simulated values gains nothing.
+
+        What rounding has added is then known by its power alone, step**2 / 12 (B. Widrow,
+        I. Kollar, *Quantization Noise* (2008)).
+        """
         if not seen.is_coarse:
             return None
-        return Reading({"step": 1e-6 * self.step}, (seen.measured - seen.output)[seen.used],
-                       (seen.measured - self.simulate(seen.output, None))[seen.used],
+        before = (seen.measured - seen.output)[seen.used]
+        after = (seen.measured - self.simulate(seen.output, None))[seen.used]
+        share = min(self.step**2 / 12 / np.mean(before**2), _MOST)
+        if np.mean(after**2) > (1 - share) * np.mean(before**2):
+            after = before * np.sqrt(1 - share)
+        return Reading({"step": 1e-6 * self.step}, before, after,
                        next(words for words in seen.found.words if "multiples" in words))
 
     def simulate(self, values, circumstances):

@@ -1,0 +1,74 @@
+"""Instants of sampling that scatter."""
+
+import dataclasses
+
+import numpy as np
+
+from ..parameters import parameter
+from .base import STAMPS, Effect, Reading
+from .residual_power import likelihood, variance_law
+
+# Standard deviations by which the residual's power must follow the slope's, the logarithm of the
+# likelihood by which the slope must beat any other measure of the motion, and the share of the
+# residual's power that must be due to it.
+_SIGNIFICANT = 8.0
+_BETTER = 12.0
+_SHARE = 0.05
+# Correlation of one sample's shift with the next, above which the instants wander and do not
+# scatter.
+_INDEPENDENT = 0.2
+
+
+@dataclasses.dataclass(frozen=True)
+class SamplingJitter(Effect):
+    """The instants of sampling scatter, the stamps do not.
+
+    No value can be put right, as its instant is not known; what it is worth depends on the slope.
+    """
+
+    cause = "sampling_jitter"
+    read_off = True
+    stage = STAMPS
+    explanation = ("The instants of sampling scatter although the stamps do not: the error grows "
+                   "with the slope of the signal.")
+    experiment = ("Excite with one high frequency and with one low frequency of the same "
+                  "amplitude: the error of scattering instants grows with the frequency.")
+
+    rms_s: float = parameter("s", minimum=0, maximum=10, null=0.0)
+
+    @classmethod
+    def recognised(cls, seen, shown):
+        """The residual's power is noise and J**2 times the slope's, sample by sample."""
+        if seen.found.jitter_rms_s:
+            return None  # stamps that scatter do the same
+        rate, used = seen.record.sampling_rate_hz, seen.used
+        error = (seen.measured - seen.output)[used]
+        slope = _slope(seen.output)
+        measures = {"slope": slope, "level": seen.output - seen.output[used].mean(),
+                    "bend": np.gradient(np.gradient(seen.output))}
+        squares = {name: np.square(values[used]) for name, values in measures.items()}
+        fits = {name: variance_law(error, square) for name, square in squares.items()}
+        noise, factor, std = fits["slope"]
+        share = factor * squares["slope"].mean() / np.mean(error**2)
+        own = likelihood(error, noise + factor * squares["slope"])
+        if factor < _SIGNIFICANT * std or share < _SHARE or any(
+                own - likelihood(error, fits[name][0] + fits[name][1] * squares[name]) < _BETTER
+                for name in ("level", "bend")):
+            return None
+        shift = error * slope[used] / (noise + factor * squares["slope"])
+        if any(abs(np.corrcoef(shift[lag:], shift[:-lag])[0, 1]) > _INDEPENDENT
+               for lag in (1, 2, 3)):
+            return None
+        rms = float(np.sqrt(factor))
+        after = error * np.sqrt(noise / (noise + factor * squares["slope"]))
+        return cls(rms / rate), Reading(
+            {"rms_s": float(std / (2 * rms) / rate)}, error, after,
+            f"the error's power follows the square of the slope: {share:.0%} of it, "
+            f"{factor / std:.3g} standard deviations from none")
+
+
+def _slope(values):
+    """Derivative by the sample's number; central differences on four times as many points."""
+    from scipy.signal import resample_poly
+    fine = resample_poly(values, 4, 1)
+    return 4 * np.gradient(fine)[::4]

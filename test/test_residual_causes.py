@@ -1,0 +1,79 @@
+"""What shows in the residual's power alone: scattering instants, bursts, rounded noise."""
+
+import numpy as np
+import pytest
+from second_set_bench import RATE, Multisine, model, samples, times
+
+from frac_accel import Corrector
+from frac_accel.diagnosis import diagnose
+
+N, NOISE = 8000, 0.01
+
+
+def bursts(rng, share):
+    """Stretches of 5 to 60 samples."""
+    inside = np.zeros(N, bool)
+    while inside.mean() < share:
+        start = rng.integers(1, N)
+        inside[start:start + rng.integers(5, 61)] = True
+    return inside
+
+
+def record(kind, seed):
+    """Instants, reference and what the sensor says."""
+    rng = np.random.default_rng(seed)
+    t, sine = times(N / RATE), Multisine(rng)
+    scatter = 2e-4 * rng.normal(size=N) if kind == "sampling_jitter" else 0.0
+    values = sine.motion(t + scatter) + NOISE * rng.normal(size=N)
+    if kind == "interference_bursts":
+        values += 0.3 * bursts(rng, 0.03) * rng.normal(size=N)
+    elif kind == "quantization":
+        values = 0.153 * np.round((values + 0.018 * rng.normal(size=N)) / 0.153)
+    elif kind == "spikes":
+        values[rng.integers(0, N, 8)] += 0.5
+    elif kind == "gain noise":
+        values *= 1 + 0.05 * rng.normal(size=N)
+    elif kind == "moving delay":
+        values = sine.motion(t + 3e-4 * np.sin(2 * np.pi * 1.3 * t)) + NOISE * rng.normal(size=N)
+    elif kind == "loose contact":
+        values *= ~bursts(rng, 0.02)
+    elif kind == "heavy tails":
+        values += NOISE * rng.standard_t(3, size=N)
+    return t, sine.acceleration(t), values
+
+
+def found(kind, seed):
+    t, reference, values = record(kind, seed)
+    return {f.cause: f for f in diagnose((samples(t, reference), samples(t, values)), model(),
+                                         "x").findings}
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("cause, truth", [
+    ("sampling_jitter", {"rms_s": 2e-4}), ("interference_bursts", {"share": 0.03, "rms": 0.3}),
+    ("quantization", {"step": 0.153})])
+def test_recognised_and_nothing_else(cause, truth, seed):
+    findings = found(cause, seed)
+    assert set(findings) == {cause}
+    for name, value in truth.items():
+        # the last of the stretches takes the share beyond what was wanted
+        assert abs(getattr(findings[cause].effect, name) / value - 1) < (
+            0.3 if name == "share" else 0.15)
+    assert findings[cause].gain.reduction > 0.1
+
+
+@pytest.mark.parametrize("kind", ["nothing", "spikes", "gain noise", "moving delay",
+                                  "loose contact", "heavy tails"])
+def test_neither_where_it_is_something_else(kind):
+    assert not {"sampling_jitter", "interference_bursts", "quantization"} & set(found(kind, 7))
+
+
+def test_a_burst_may_be_anywhere_so_that_every_sample_is_worth_less():
+    t, reference, values = record("interference_bursts", 1)
+    made = samples(t, values)
+    plain, informed = (Corrector(model(*effects), RATE, noise_std=NOISE).process(
+        made.stamps_ns, made.values) for effects in (
+        [], [{"cause": "interference_bursts", "share": 0.03, "rms": 0.3}]))
+    assert np.array_equal(plain.values, informed.values)
+    ratio = informed.variance[200:, 0] / plain.variance[200:, 0]
+    np.testing.assert_allclose(ratio, 1 + 0.03 * 0.3**2 / NOISE**2, rtol=0.05)
