@@ -1,4 +1,5 @@
-# make setup | demo | test | lint | bench | soak | blind | fuzz | browser | pins | clean
+# make setup | demo | check | test | test-all | lint | types | bench | soak | blind | fuzz |
+#      browser | pins | clean
 # Needs Python 3.10 to 3.13, git and make. PYTHON=python3.12 chooses the Python of .venv.
 
 # A ROS that is sourced, or another venv with ROS, must not leak into ours.
@@ -6,12 +7,12 @@ unexport PYTHONPATH LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DELETE_ON_ERROR:
-.PHONY: setup demo test test-oldest lint bench soak blind fuzz browser pins clean FORCE
+.PHONY: setup demo check test test-all test-oldest lint types bench soak blind fuzz browser pins clean FORCE
 
 venv := .venv
 oldest := .venv-oldest
 python := $(venv)/bin/python
-numerical := -m pytest -n 2 -m "not ros"
+numerical := -m pytest -n 2
 
 pythons := python3 python3.13 python3.12 python3.11 python3.10
 # Those for which scipy 1.11.4 has wheels; ROS 2 Jazzy itself has 3.12.
@@ -27,11 +28,19 @@ demo: setup
 	$(python) -m frac_accel.demo --output-dir demo_output
 
 # BLAS threads would only fight with the other worker.
-test test-oldest: export OPENBLAS_NUM_THREADS := 1
+check test test-all test-oldest: export OPENBLAS_NUM_THREADS := 1
 
-test: setup lint
-	$(python) $(numerical)
+# In a minute what catches most.
+check: $(venv)/.frac_accel lint types
+	$(python) -m pytest -q -n 2 -m fast
+
+test: setup lint types
+	$(python) $(numerical) -m "not ros and not long"
 	$(python) -m pytest -m ros
+
+# The long Monte Carlos, and everything else once more with the oldest libraries.
+test-all: setup
+	$(python) $(numerical) -m "not ros and long"
 	@if $(find_oldest) >/dev/null; then $(MAKE) --no-print-directory test-oldest; else \
 	    echo "so the numerical suite was not run with numpy 1.26.4 and scipy 1.11.4"; fi
 
@@ -42,6 +51,9 @@ test-oldest: $(oldest)/.done
 
 lint: $(venv)/.done
 	$(python) -m ruff check .
+
+types: $(venv)/.done
+	$(python) -m mypy
 
 # On a quiet machine; what else it was busy with stands in the output.
 bench: setup

@@ -144,7 +144,7 @@ def test_what_the_model_lacks_is_said():
     record = rig.simulate_record(sensor, excitation, rng, snr_db=60)
     result = identify(pair_of(record), structure="oscillator")
     assert result.held_out_nrmse > 0.01
-    assert "a more complete model could explain" in result.validation.verdict[0]
+    assert "a better model could explain a further" in result.validation.verdict[0]
 
 
 STAMPS = np.arange(100) * 1_000_000

@@ -99,7 +99,8 @@ def _temperatures(reader, topic, model):
 
 def fates(counters):
     """What happened to samples that were not simply corrected, in words."""
-    words = {"warm_up": "before the filter was full", "waiting": "after the last full filter",
+    words = {"warm_up": "at the start (the filter needs earlier samples)",
+             "waiting": "at the end (the filter needs later samples)",
              "cut_off": "before a long gap", "duplicates": "with a repeated stamp",
              "stamps_back": "with a stamp that goes back", "early": "too many by their stamps",
              "not_finite": "not finite", "implausible": "that cannot be true",

@@ -100,5 +100,5 @@ def table(found, axis):
     if found.findings:
         lines.append(f"the extended model leaves {found.extended['rmse']:.4g} "
                      f"({found.extended['nrmse']:.3%}); {found.unexplained_fraction:.1%} of the "
-                     "excess error is unexplained")
+                     "error's power above the noise is unexplained")
     return "\n".join(lines)

@@ -68,7 +68,7 @@ def _print(result, pairs, bags):
     print(result.excitation.words)
     if result.excitation.kind == "multisine" and result.points and result.points.distortion:
         print(result.points.distortion["words"])
-    print(f"{result.structure}: {result.reason}")
+    print(f"structure: {result.structure} ({result.reason})")
     for name, entry in result.parameters.items():
         print(f"  {name:21} {entry['value']:12.6g} +- {entry['std']:.2g} {entry['unit']}")
     print(f"  residual {result.nrmse:.3%} of the output, {result.held_out_nrmse:.3%} on held-out "

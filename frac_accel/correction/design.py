@@ -259,8 +259,8 @@ def _clock_ratio(model):
     """Ratio of the sensor's clock, which is one for all axes."""
     ratios = {axis.clock_ratio for axis in model.axes}
     if len({axis.time_steps for axis in model.axes}) > 1:
-        raise DesignError("effects: time_step differs between the axes, but a sample has one stamp "
-                          "for all of them")
+        raise DesignError("effects: the stamps jump otherwise on one axis than on another, but a "
+                          "sample has one stamp for all of them")
     if len(ratios) > 1:
         raise DesignError("effects: the clock's rate differs between the axes, but a sample has "
                           "one stamp for all of them")

@@ -99,8 +99,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     found = record.integrity(column)
     found.words.extend(turned)
     if len(record) < _FEWEST:
-        return insufficient(f"the record has {len(record)} samples, expected at least {_FEWEST}",
-                            model, found)
+        return insufficient(f"only {len(record)} samples; {_FEWEST} needed", model, found)
     moving, notes = moving_samples(record, column)
     found.words.extend(notes)
     shown = _shown(found, record.sensor[:, column])
@@ -110,11 +109,10 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     for effect in shown.values():
         used &= ~effect.spoiled(record.sensor[:, column])
     split = learning_length(record.reference[:, column])
-    for rows, part in ((used[:split], "before"), (used[split:], "after")):
+    for rows, part in ((used[:split], "training"), (used[split:], "held-out")):
         if rows.sum() < _FEWEST // 4:
-            return insufficient(f"{rows.sum()} samples count {part} the instant that parts "
-                                f"learning from judging, expected at least {_FEWEST // 4}",
-                                model, found)
+            return insufficient(f"only {rows.sum()} {part} samples; {_FEWEST // 4} needed", model,
+                                found)
     seed = None
     if model is None:
         progress("identifying a classical model")

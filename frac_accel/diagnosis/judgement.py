@@ -474,8 +474,7 @@ def _evidence(cause, g, margin, instead):
     words = [f"held-out error {g.before:.4g} without it, {g.after:.4g} with it "
              f"({g.reduction:.1%} less, 95 % interval {g.ci95[0]:.1%} to {g.ci95[1]:.1%})"]
     if instead:
-        words.append(f"nearest rival: {' with '.join(instead)}, behind by {margin:.4g} variances "
-                     "of the noise")
+        words.append(f"nearest rival: {' with '.join(instead)}, fits worse by {margin:.2g} σ²")
     return words
 
 
@@ -495,7 +494,7 @@ def _moved(engine, best, loose, stds):
         g = gain(error + (best.simulated - held)[rows], error)
         if g.ci95[0] > 0 and g.reduction > _RELEVANT:
             findings.append(Finding(effect, stds[cause], _confidence(farthest**2), [], [
-                f"{farthest:.3g} standard uncertainties from what the model allows for",
+                f"{farthest:.3g} standard uncertainties from the model's own value",
                 *_evidence(cause, g, np.inf, [])], g))
     return findings
 

@@ -3,9 +3,12 @@
 Also as a command: ``python -m frac_accel.effect_checks CAUSE``.
 """
 
+import dataclasses
+
 import numpy as np
 
 from ..errors import ModelError
+from ..parameters import parameter_fields
 from . import behaviour, declaration
 from .draws import Broken, Draws
 
@@ -23,6 +26,9 @@ CHECKS = {
     "inversion of motion": behaviour.inverts_motion,
     "starts": declaration.starts_within_bounds,
 }
+# Those of a cause whose coefficients cannot be drawn, or that is none of the sensor's, which then
+# neither simulates nor corrects it.
+DECLARED = ("declaration", "documentation", "YAML", "starts")
 
 
 def check_effect(cls, seed=0):
@@ -52,7 +58,7 @@ def check_effect(cls, seed=0):
     >>> frac_accel.check_effect(effect_of("offset"))
     """
     for number, (name, check) in enumerate(CHECKS.items()):
-        if not _applies(cls, check):
+        if name not in DECLARED and (_has_lists(cls) or getattr(cls, "of_reference", False)):
             continue
         try:
             with np.errstate(all="ignore"):
@@ -64,14 +70,9 @@ def check_effect(cls, seed=0):
             raise ModelError(f"{_who(cls)}: {name}: {type(error).__name__}: {line}") from error
 
 
-def _applies(cls, check):
-    """A fault of the reference is no part of the sensor; lists of coefficients cannot be drawn."""
-    if check in (declaration.declares, declaration.documents):
-        return True
-    if any(field.metadata.get("list") for field in
-           getattr(cls, "__dataclass_fields__", {}).values()):
-        return False
-    return check.__module__ == declaration.__name__ or not getattr(cls, "of_reference", False)
+def _has_lists(cls):
+    return dataclasses.is_dataclass(cls) and any(
+        field.metadata.get("list") for field in parameter_fields(cls))
 
 
 def _who(cls):

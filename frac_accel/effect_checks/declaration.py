@@ -13,7 +13,7 @@ from ..effects.base import REFERENCE, STAMPS, Effect
 from ..effects.fit_starts import Start
 from ..errors import FracAccelError
 from ..model import AXES, SensorModel
-from ..parameters import Scales, as_mapping, build, parameter_fields, plain
+from ..parameters import Scales, as_mapping, build, is_varied, parameter_fields, plain
 from .draws import CORE, RATE, Broken, sensor_with, span, words
 
 _TABLE = Path(__file__).parents[2] / "docs" / "effects.md"
@@ -37,10 +37,10 @@ def declares(cls, draws):
     for field in dataclasses.fields(cls):
         if not field.metadata:
             raise Broken(f"`{field.name}` is not declared with `parameter`")
-        if not field.metadata.keys() & {"list", "choices"}:
+        if is_varied(field):
             _complete(field)
-    if not cls.read_off and parameter_fields(cls) \
-            and all(field.metadata.get("null") is None for field in parameter_fields(cls)):
+    varied = [field for field in parameter_fields(cls) if is_varied(field)]
+    if not cls.read_off and varied and all(f.metadata["null"] is None for f in varied):
         raise Broken("no parameter declares `null`, the value with which it changes nothing")
     names = {field.name for field in parameter_fields(cls)}
     for axis in AXES:
@@ -85,10 +85,18 @@ def _complete(field):
 
 def row(cls):
     """The cause's row in the table of docs/effects.md."""
-    units = {field.name: field.metadata.get("unit", "1") for field in parameter_fields(cls)}
-    parameters = ", ".join(f"`{name}`" + ("" if unit == "1" else f" [{unit}]")
-                           for name, unit in units.items())
+    parameters = ", ".join(f"`{field.name}`{_kind(field)}" for field in parameter_fields(cls))
     return f"| `{cls.cause}` | {parameters} | {cls.explanation} |"
+
+
+def _kind(field):
+    """Unit or choice of a parameter, in brackets."""
+    limits = field.metadata
+    if limits.get("choices"):
+        return f" ({', '.join(limits['choices'])})"
+    if limits.get("whole"):
+        return f" ({limits['minimum']} to {limits['maximum']})"
+    return "" if limits.get("unit", "1") == "1" else f" [{limits['unit']}]"
 
 
 def documents(cls, draws):
@@ -97,23 +105,30 @@ def documents(cls, draws):
     # what a dataclass writes where there is none
     if not written or written.startswith(f"{cls.__name__}("):
         raise Broken("the class has no docstring")
+    # what is no cause by itself is described below the table
     if cls.__module__.startswith("frac_accel.effects.") and _TABLE.exists() \
+            and all(map(_is_number, parameter_fields(cls))) \
             and row(cls) not in _TABLE.read_text(encoding="utf-8").splitlines():
         raise Broken(f"docs/effects.md lacks its row: {row(cls)}")
 
 
+def _is_number(field):
+    return not field.metadata.get("list")
+
+
 def survives_yaml(cls, draws):
     """Parameters are the same after they were written to a model file and read."""
+    if not all(map(_is_number, parameter_fields(cls))):
+        return  # nobody can draw its coefficients
     registered = cls.cause in effect_names()
     if registered and effect_of(cls.cause) is not cls:
         raise Broken(f"another class, {effect_of(cls.cause).__qualname__}, has this cause's name")
     for _ in range(_DRAWS):
         effect = draws.any(cls)
         if registered:
-            own = {"reference_faults" if cls.of_reference else "effects": [effect]}
-            read = SensorModel.from_dict(yaml.safe_load(yaml.safe_dump(
-                SensorModel(CORE, **own).to_dict())))
-            again = (read.reference_faults if cls.of_reference else read.effects)[0]
+            place = "reference_faults" if cls.of_reference else "effects"
+            text = yaml.safe_dump(SensorModel(CORE, **{place: [effect]}).to_dict())
+            again = getattr(SensorModel.from_dict(yaml.safe_load(text)), place)[0]
         else:
             again = build(cls, yaml.safe_load(yaml.safe_dump(plain(as_mapping(effect)))), cls.cause)
         if again != effect:
@@ -122,6 +137,8 @@ def survives_yaml(cls, draws):
 
 def starts_within_bounds(cls, draws):
     """A fit begins, whatever the record holds, with effects of this class that are allowed."""
+    if cls.read_off and cls.starts.__func__ is Effect.starts.__func__:
+        return
     from ..diagnosis.search import View
     from ..simulation import simulate
     n = 1024
@@ -130,16 +147,17 @@ def starts_within_bounds(cls, draws):
     simulated = simulate(sensor_with(), reference, RATE)[:, 0]
     for effect in (None, draws.usual(cls), draws.usual(cls)):
         measured = simulated
-        if effect is not None:
+        if effect is not None and not cls.of_reference:
             try:
                 measured = simulate(sensor_with(effect), reference, RATE,
                                     temperature_c=temperature)[:, 0]
             except FracAccelError:
                 continue
         measured = measured + 1e-3 * draws.rng.normal(size=n)
-        view = View(RATE, np.arange(n) / RATE, measured, simulated, measured - simulated,
-                    np.ones(n, bool), CORE, 0.0, 0.0, float(np.std(measured)), True,
-                    dict.fromkeys(AXES, True), "x")
+        view = View(rate=RATE, time=np.arange(n) / RATE, measured=measured, simulated=simulated,
+                    residual=measured - simulated, used=np.ones(n, bool), core=CORE,
+                    since_start_s=0.0, delay_s=0.0, level=float(np.std(measured)), warms=True,
+                    excited=dict.fromkeys(AXES, True), axis="x")
         starts = cls.starts(view)
         if cls.read_off and starts:
             raise Broken("it is read off a record, but has start points, too")

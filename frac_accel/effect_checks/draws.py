@@ -43,20 +43,20 @@ class Draws:
 
     def _accepted(self, cls, value):
         for _ in range(_TRIES):
-            drawn = {field.name: self._counted(field) if not is_varied(field)
-                     else float(value(field)) for field in parameter_fields(cls)}
+            drawn = {field.name: float(value(field)) if is_varied(field) else self._fixed(field)
+                     for field in parameter_fields(cls)}
             try:
                 return build(cls, drawn, cls.cause)
             except ModelError as error:
                 refusal = error
         raise Broken(f"none of {_TRIES} draws from the declared ranges is accepted: {refusal}")
 
-    def _counted(self, field):
-        """A word or a count that the field allows."""
+    def _fixed(self, field):
+        """A count or a word."""
         if field.metadata.get("choices"):
             return str(self.rng.choice(field.metadata["choices"]))
         low, high = span(field)
-        return int(self.rng.integers(np.ceil(low), np.floor(high) + 1))
+        return int(self.rng.integers(np.ceil(low), np.floor(min(high, low + 10)) + 1))
 
     def _usual(self, field):
         if field.metadata["null"] == "core":

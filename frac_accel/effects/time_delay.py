@@ -15,8 +15,7 @@ class TimeDelay(Effect):
 
     cause = "time_delay"
     stage = DELAY
-    explanation = ("The samples are stamped later (below zero: earlier) than the motion that they "
-                   "show.")
+    explanation = "The stamps lag the motion by delay_s (negative: they lead)."
     everyday = True
     experiment = ("Excite a wider band, up to frequencies where a delay of this size turns the "
                   "phase by radians: its phase is a straight line over frequency, and no "

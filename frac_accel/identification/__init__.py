@@ -103,7 +103,7 @@ def identify(pair: Any, axis: str = "x", structure: str = "auto",
     elif structure == "classical":
         chosen, reason = choose_classical(datas[0])
     else:
-        chosen, reason = Candidate.of(structure, datas[0]), "asked for"
+        chosen, reason = Candidate.of(structure, datas[0]), "requested"
     return identification(chosen, reason, datas, records, axis, provenance or {}, agreeing)
 
 

@@ -99,12 +99,12 @@ def choose_of_several(structure, datas, records):
     """
     if structure != "auto":
         chosen, agreeing = _combined(structure, datas, records)
-        return chosen, "asked for", agreeing
+        return chosen, "requested", agreeing
     classical, agreeing = _combined("oscillator", datas, records)
     try:
         fractional, fractionally = _combined("fractional", datas, records)
     except IdentificationError as error:
-        return classical, f"the data cannot tell more: {error}", agreeing
+        return classical, f"no fractional model: {error}", agreeing
     better, reason = _preferred(classical, fractional, datas, "residual on other records")
     return better, reason, fractionally if better is fractional else agreeing
 
@@ -115,7 +115,7 @@ def _choose_oscillator(data):
     try:
         fractional = Candidate.of("fractional", data)
     except IdentificationError as error:
-        return classical, classical.held_out_nrmse, f"the data cannot tell more: {error}"
+        return classical, classical.held_out_nrmse, f"no fractional model: {error}"
     chosen, reason = _preferred(classical, fractional, [data], "held-out residual")
     return chosen, min(classical.held_out_nrmse, fractional.held_out_nrmse), reason
 

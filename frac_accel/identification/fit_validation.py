@@ -187,9 +187,8 @@ def p_words(p_value):
 def _residual_words(tests, nrmse):
     if not tests.independent:
         return ["the residual depends on the reference "
-                f"({p_words(tests.independence_p_value)}): it holds "
-                f"{tests.dependent_share * nrmse:.2%} of the output that a more complete model "
-                "could explain"]
+                f"({p_words(tests.independence_p_value)}): a better model could explain a further "
+                f"{tests.dependent_share * nrmse:.2%} of the output"]
     words = ["the residual does not depend on the reference "
              f"({p_words(tests.independence_p_value)})"]
     if tests.white:

@@ -39,8 +39,9 @@ def candidate_notes(parameters, chosen, data, band_hz):
 def _bound_notes(chosen):
     """What the search would have taken further than it may go."""
     reached = {name: fit for fit in chosen.fits for name in fit.at_bounds}
-    return [f"the search ended at the limit of {name}, {fit[name]:.4g}: the data leave it open or "
-            "call for what no such sensor has; its uncertainty holds how far they would go beyond"
+    return [f"the fit stopped at the limit of {name}, {fit[name]:.4g}: the data do not determine "
+            "it, or the sensor is of another kind; its uncertainty includes how far beyond the "
+            "limit they reach"
             for name, fit in reached.items()]
 
 

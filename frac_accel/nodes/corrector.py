@@ -142,8 +142,8 @@ class Corrector(FracAccelNode):
                      "lowest frequency to correct; 0: none, or where a high-pass leaves a fifth",
                      read_only=False, minimum=0.0, maximum=1e8)
         self.declare("max_delay_s", 0.0,
-                     "permitted delay of the filter; 0: the shortest that is hardly noisier than "
-                     "an ideal one", read_only=False, minimum=0.0, maximum=3600.0)
+                     "permitted delay of the filter; 0: the shortest with noise within 30 % of "
+                     "an ideal band limit", read_only=False, minimum=0.0, maximum=3600.0)
         self.declare("noise_std", 0.0,
                      "standard deviation of the raw noise where messages come without a "
                      "covariance; 0: the model's", minimum=0.0, maximum=1e12)

@@ -124,13 +124,13 @@ def _causes(section, found):
 
 
 def _suspects(section, found):
-    section.text("These would explain what was seen, but so would others, or too much is left "
-                 "unexplained to name them. They are not part of the extended model.")
+    section.text("These fit, but so do others, or too much stays unexplained to name them. They "
+                 "are not part of the extended model.")
     section.table(["suspects", "margin", "experiment that tells"],
                   [[_listed(suspect["causes"]), f"{suspect['margin']:.3g}", suspect["experiment"]]
                    for suspect in found.suspects],
-                  "Margin: by how many variances of the noise the first choice is ahead of its "
-                  "nearest rival; 0 where too much is left for any margin to count.")
+                  "Margin: by how many variances σ² of the noise the nearest rival fits worse; 0 "
+                  "where too much is left unexplained for a margin to count.")
 
 
 def _model(section, found):

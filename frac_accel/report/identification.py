@@ -53,7 +53,7 @@ def identification_page(result, pair, axis="x", provenance=None):
 
 
 def _summary(section, result):
-    section.notice(f"{result.structure}: {result.reason}.")
+    section.notice(f"Structure: {result.structure} ({result.reason}).")
     section.text(f"The model leaves {result.nrmse:.3%} of the sensor's output unexplained (RMS of "
                  "the residual over the standard deviation of the output). "
                  + _held_out(result.held_out_nrmse))
@@ -98,7 +98,7 @@ def _parameters(section, result):
               for i in range(len(names)) for j in range(i) if
               abs(matrix[i, j]) > _STRONG_CORRELATION]
     if strong:
-        section.text("Known together better than each alone: " + "; ".join(strong) + ".")
+        section.text("Correlated: " + "; ".join(strong) + ".")
 
 
 def _excitation(section, result, reference, sensor, pair):
