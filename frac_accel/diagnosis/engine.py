@@ -18,7 +18,7 @@ from ..identification.excitation import (
 from ..identification.uncertainty import sandwich
 from .gain import gain
 from .leftover import leftover
-from .names import special_case
+from .names import on_bound, special_case
 from .problem import Problem
 from .search import Search
 
@@ -79,7 +79,7 @@ class Engine:
         self._wanted = used
         self.search = Search(self.problem, base, candidates, log)
         self.held_out_rows = used & self.problem.used & held_out(record.reference[:, axis])
-        self._learnt = {}
+        self._learnt, self._budgets = {}, {}
         # what the numerics of the simulation may still be wrong by
         self.floor = 3e-5 * float(np.std(record.sensor[used, axis]))
 
@@ -89,6 +89,11 @@ class Engine:
         variance = fitted.cost / left
         return max(_CHANCE * variance * noise_peak(fitted.residual, self.problem.used),
                    self.floor**2 * left)
+
+    def promises(self, fitted, cost):
+        """Whether a cost that a screening expects is worth a fit."""
+        return fitted.cost - cost > max(_CHANCE * cost / self.problem.count,
+                                        self.floor**2 * self.problem.count)
 
     def run(self, seed=None):
         """The smallest set of causes that describes the record.
@@ -116,8 +121,10 @@ class Engine:
             # what a part shows is sought there; the whole is searched for what takes time to show
             self.search.candidates = [cause for cause in self.search.candidates
                                       if effect_of(cause).shows_with_time]
-            return self.search.run(self.threshold, self.noise_only, seed, most=_SLOW)
-        self.best = self.compete(self.search.run(self.threshold, self.noise_only, seed))
+            return self.search.run(self.threshold, self.promises, self.noise_only, seed,
+                                   most=_SLOW)
+        self.best = self.compete(self.search.run(self.threshold, self.promises, self.noise_only,
+                                             seed))
         return self.best
 
     def score(self, fitted, variance):
@@ -150,20 +157,23 @@ class Engine:
     def _general(self, near, variance):
         """The first of some fits by score; where it is a special case of one close behind, that."""
         first = near[0]
-        if not self.special_cases(first):
+        if not self.hollow(first):
             return first
         limit = self.score(first, variance) + _CLOSE
         return next((fit for fit in near[1:] if self.score(fit, variance) < limit
-                     and not self.special_cases(fit)), first)
+                     and not self.hollow(fit)), first)
 
-    def special_cases(self, fitted):
-        """Causes of a fit that are, within their uncertainty, a simpler one's; with words."""
+    def hollow(self, fitted):
+        """Whether a cause of a fit lies at the end of what was searched, or is, within its
+        uncertainty, a simpler one's special case."""
+        if any(on_bound(unknown, place) for unknown, place in zip(fitted.unknowns, fitted.theta)
+               if unknown.cause not in self.search.base):
+            return True
         if not any(effect.nested for effect in fitted.effects.values()):
-            return {}
+            return False
         stds, core = self.uncertainties(fitted), self.problem.baseline.axis(self.problem.axis).core
-        found = {cause: special_case(effect, stds.get(cause, {}), core)
-                 for cause, effect in fitted.effects.items()}
-        return {cause: words for cause, words in found.items() if words}
+        return any(special_case(effect, stds.get(cause, {}), core)
+                   for cause, effect in fitted.effects.items())
 
     def rivals(self, best, cause):
         """Sets without a cause, no larger than the best, by score; (margin, causes)."""
@@ -174,10 +184,9 @@ class Engine:
         found = [(self.score(fit, variance) - own, fit.causes) for fit in
                  self.search.fits.values()
                  if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
-        found = sorted(found, key=lambda entry: entry[0])
-        while found and found[0][0] < _CLOSE and self.special_cases(self.search.fits[found[0][1]]):
-            found.pop(0)  # the same explanation in other words
-        return found
+        # a hollow one that is close says the same in other words
+        return [entry for entry in sorted(found, key=lambda entry: entry[0])
+                if entry[0] > _CLOSE or not self.hollow(self.search.fits[entry[1]])]
 
     def uncertainties(self, fitted):
         """Standard uncertainties by cause and parameter, for any spectrum of the residual."""
@@ -217,11 +226,14 @@ class Engine:
         """`Budget` of what a fit leaves, of all samples that are there; None without time for it.
         """
         p = self.problem
+        if fitted.causes in self._budgets:
+            return self._budgets[fitted.causes]
         if p.limit.ends_judging("the error budget was left out"):
             return None
         residual = np.where(p.record.valid, p.measured - fitted.output, 0.0)
         residual[:p.edge] = residual[len(residual) - p.edge:] = 0.0
-        return self._division.of(residual, p.measured, fitted.output)
+        self._budgets[fitted.causes] = self._division.of(residual, p.measured, fitted.output)
+        return self._budgets[fitted.causes]
 
     def learnt(self, fitted):
         """The same causes, fitted to the learning part of the record only."""

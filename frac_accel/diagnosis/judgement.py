@@ -9,9 +9,11 @@ from scipy.signal import resample_poly
 
 from ..budget import WORDS
 from ..effects import known_effects
+from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..parameters import fixed_values, parameter_fields
 from ..shown import Shown
+from .empirical import fit_empirical_link
 from .evidence import Evidence
 from .experiments import separating_experiment
 from .gain import gain
@@ -25,8 +27,12 @@ _AS_NOISE = 1.2
 # noise.
 _PART = 0.1
 _PART_AT_LEAST = 0.03
+# Verdicts that leave something to be described.
+_INCOMPLETE = ("unexplained", "partly_explained")
 # Share of the excess power that rounds to nothing.
 _NOTHING = 0.0005
+# Times what is left that is no noise by which a cause must explain more.
+_WEIGHS = 1.5
 # Standard uncertainties by which a delay below zero is one.
 _ACAUSAL = 3.0
 # Share of the baseline's excess power that may be left where causes are named.
@@ -287,6 +293,12 @@ def _doubts(engine, best, gains, stds, left, noise):
         words = undetermined(best.effects[cause], *zip(*places), stds[cause], core)
         if words:
             doubts[cause] = words
+    unexplained = _no_noise(engine, best, left)
+    for cause, g in gains.items():
+        takes = float(np.sqrt(max(g.before**2 - g.after**2, 0.0)))
+        if takes < _WEIGHS * unexplained:
+            doubts.setdefault(cause, f"what it explains ({takes:.3g} RMS) is no more than what is "
+                                     f"left unexplained ({unexplained:.3g} RMS)")
     for cause, words in _acausal(engine, best, stds).items():
         doubts.setdefault(cause, words)
     for pair in cancelling({cause: engine.added(best, cause) for cause in gains}):
@@ -297,6 +309,12 @@ def _doubts(engine, best, gains, stds, left, noise):
         for cause, words in engine.unstable(best).items():
             doubts.setdefault(cause, words)
     return {cause: words for cause, words in doubts.items() if cause in gains}
+
+
+def _no_noise(engine, fitted, left):
+    """RMS of what is left that is no noise, as far as the tests of the residual see it."""
+    shares = [left.share, *(share for share, _ in _structured(engine.budget(fitted)))]
+    return float(np.sqrt(max(shares))) * left.rms
 
 
 def _acausal(engine, best, stds):
@@ -387,9 +405,14 @@ def _verdict(engine, best, left, findings, suspects, found, noise):
     budget = engine.budget(fitted)
     strange = _structured(budget)
     verdict = _word(findings, suspects, complete, left.share, fraction, accounted, strange)
-    model = _extended(engine, {**fitted.effects, **{f.cause: f.effect for f in findings}})
+    effects = {**fitted.effects, **{f.cause: f.effect for f in findings}}
+    described, after = _described(engine, fitted, after) if verdict in _INCOMPLETE \
+        and any(part == "linear" for _, part in strange) else ({}, after)
+    model = _extended(engine, {**effects, **described})
+    description = ("; the extended model has a fitted filter, which describes a part of it and "
+                   "names nothing") if described else ""
     return Diagnosis(
-        verdict, _reason(verdict, after / spread, noise, accounted, strange),
+        verdict, _reason(verdict, after / spread, noise, accounted, strange) + description,
         {"rmse": before, "nrmse": before / spread, "noise_rms": noise_rms},
         findings, suspects,
         {"rmse": after, "nrmse": after / spread},
@@ -398,6 +421,24 @@ def _verdict(engine, best, left, findings, suspects, found, noise):
         noise.as_dict(), p.limit.summary(),
         [entry for of, parted in (("baseline", engine.budget(baseline)), ("extended", budget))
          if parted is not None for entry in parted.as_list(of)])
+
+
+def _described(engine, fitted, after):
+    """A fitted filter that stands for what no cause explains, by cause, and the held-out error."""
+    p = engine.problem
+    rest = engine.held_out_rows
+    if p.limit.ends_judging("no filter was fitted to what is left"):
+        return {}, after
+    try:
+        found = fit_empirical_link(p.measured, fitted.output, p.used, rest, p.rate)
+        if not found.is_worth_it:
+            return {}, after
+        effects = {**fitted.effects, found.effect.cause: found.effect}
+        output = p.simulate(effects)
+    except FracAccelError:
+        return {}, after
+    error = _rms(p.measured - output, rest)
+    return ({found.effect.cause: found.effect}, error) if error < after else ({}, after)
 
 
 def _structured(budget):

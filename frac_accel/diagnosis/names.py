@@ -31,8 +31,7 @@ def undetermined(effect, unknowns, theta, stds, core):
     moved = not unknowns
     for unknown, place in zip(unknowns, theta):
         value, std = getattr(effect, unknown.name), stds.get(unknown.name, np.inf)
-        bounds = [bound for bound in (unknown.low, unknown.high) if np.isfinite(bound)]
-        if unknown.logarithmic and any(abs(place - bound) < _ON_BOUND for bound in bounds):
+        if on_bound(unknown, place):
             return f"{unknown.name} lies at the end of the range that was searched"
         if unknown.logarithmic and not std < _OPEN * abs(value):
             return f"{unknown.name} is open: {value:.3g} ± {std:.1g}"
@@ -42,6 +41,12 @@ def undetermined(effect, unknowns, theta, stds, core):
     if not moved:
         return "no parameter differs from the value that changes nothing"
     return None
+
+
+def on_bound(unknown, place):
+    """Whether a parameter that is above zero lies at an end of the range that is searched."""
+    return unknown.logarithmic and any(
+        abs(place - bound) < _ON_BOUND for bound in (unknown.low, unknown.high))
 
 
 def null_value(effect, name, core):

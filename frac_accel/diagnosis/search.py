@@ -234,13 +234,15 @@ class Search:
             effect = dataclasses.replace(effect, **{start.parameter: float(scaled)})
         return cost, cause, effect
 
-    def run(self, threshold, done, seed=None, most=_MOST):
+    def run(self, threshold, promises, done, seed=None, most=_MOST):
         """Grow sets of causes until nothing is gained; the best set of each size.
 
         Parameters
         ----------
         threshold : callable
-            Cost by which a larger set must be better than a smaller fit.
+            Cost by which a fit must be better than a smaller one.
+        promises : callable
+            Whether a cost that a screening expects is worth a fit.
         done : callable
             True for a fit that leaves nothing but noise.
         seed : dict of str to Effect, optional
@@ -263,12 +265,12 @@ class Search:
             for parent in beam:
                 for cost, cause, begin in self.screen(parent):
                     key = parent.causes | {cause}
-                    if parent.cost - cost > threshold(parent) and cost < least \
+                    if promises(parent, cost) and cost < least \
                             and (key not in wanted or cost < wanted[key][0]):
                         wanted[key] = cost, self.begun(parent, cause, begin)
             chosen = sorted(wanted.values(), key=lambda entry: entry[0])[:_FITS]
             fits = self.fit_all([effects for _, effects in chosen])
-            if not fits or best.cost - fits[0].cost < threshold(best):
+            if not fits or best.cost - fits[0].cost < threshold(fits[0]):
                 break
             gained, best = 1 - fits[0].cost / best.cost, fits[0]
             beam = [fit for fit in fits[:_BEAM] if fit.cost <= _HOPELESS * best.cost]
