@@ -81,7 +81,7 @@ def require_form(said):
             assert set(entry) == {"value", "std", "unit"}
             assert math.isfinite(entry["value"]) and entry["std"] >= 0
     for suspect in said["suspects"]:
-        assert set(suspect) == {"causes", "margin", "experiment"}
+        assert set(suspect) == {"causes", "margin", "reason", "experiment"}
         assert suspect["experiment"].endswith(".")
 
 

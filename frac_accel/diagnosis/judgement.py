@@ -349,17 +349,6 @@ def _mirrored(engine, best):
     return best
 
 
-def _mirrored(engine, best):
-    """The same set with causes that say the same with the other sign, where these were as good."""
-    for fit in engine.search.fits.values():
-        turned = [effect.mirrors for cause, effect in fit.effects.items()
-                  if cause not in best.effects]
-        if turned and set(turned) == best.causes - fit.causes - set(engine.search.base) \
-                and fit.cost - best.cost < _CLEAR * best.cost / engine.problem.count:
-            return fit
-    return best
-
-
 def _suspect(causes, margin, reason):
     return {"causes": sorted(causes), "margin": float(margin), "reason": reason,
             "experiment": separating_experiment(causes)}

@@ -6,9 +6,9 @@ from ..effects import effect_of
 from ..errors import FracAccelError, ModelError
 from ..model import SensorModel
 from ..parameters import build, parameter_fields
+from ..record.topic import Integrity
 from .evidence import Evidence
 from .gain import Gain
-from .integrity import Integrity
 from .judgement import Diagnosis, Finding
 
 
@@ -42,7 +42,8 @@ def _diagnosis(data):
         [_finding(entry, known) for entry in data["findings"]], data["suspects"],
         _numbers({key: data["extended"][key] for key in ("rmse", "nrmse")}),
         _number(data["unexplained_fraction"]), model,
-        Integrity(**data["data"], words=data["integrity"]), evidence)
+        Integrity(**data["data"], words=data["integrity"]), evidence,
+        data["established_noise"], data["cut_off"], data["budget"])
 
 
 def _finding(entry, known):
