@@ -30,7 +30,7 @@ _PART_AT_LEAST = 0.03
 # Verdicts that leave something to be described.
 _INCOMPLETE = ("unexplained", "partly_explained")
 # Share of the excess power that rounds to nothing.
-_NOTHING = 0.0005
+_NOTHING = 0.005
 # Times what is left that is no noise by which a cause must explain more.
 _WEIGHS = 1.5
 # Standard uncertainties by which a delay below zero is one.
@@ -265,7 +265,7 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
         else:
             suspects.append(_suspect({cause, *instead}, margin, "another cause explains as much"))
     findings += _moved(engine, best, loose, stds)
-    findings += _read_off(engine, best, found, shown, sensor)
+    findings += _read_off(engine, best, found, shown, sensor, left)
     return _verdict(engine, best, left, findings, suspects, found, noise)
 
 
@@ -529,16 +529,19 @@ def _moved(engine, best, loose, stds):
     return findings
 
 
-def _read_off(engine, best, found, shown, sensor):
+def _read_off(engine, best, found, shown, sensor, left):
     """Findings that the record shows by itself: limits, lattice, stamps."""
     p, findings = engine.problem, []
     rows = p.record.valid.copy()
     rows[:64] = rows[-64:] = False
     seen = Seen(p.record, found, sensor, p.measured, best.output, rows, rows & p.used,
                 engine.coarse_step(best) is not None)
+    # what the size of a residual tells presumes that it is noise, or bursts of it
+    parts = _structured(engine.budget(best))
+    is_noise = all(part == "bursts" for _, part in parts)
     for cause, cls in known_effects().items():
         recognised = cls.recognised(seen, shown.get(cause)) if cls.read_off else None
-        if recognised is None:
+        if recognised is None or (cause not in shown and not is_noise):
             continue
         effect, reading = recognised
         g = gain(reading.before, reading.after)

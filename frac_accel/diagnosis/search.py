@@ -304,7 +304,15 @@ class Search:
         if known is not None and known.cost > goal and self.problem.cost(less) < known.cost:
             # that fit had ended in another valley
             del self.fits[known.causes]
-        return next(iter(self.fit_all([less], fitted.cost, goal)), None) or self.fit(less)
+        found = next(iter(self.fit_all([less], fitted.cost, goal)), None)
+        if found is None:
+            try:
+                found = self.fit(less)
+            except FracAccelError:
+                # a motion without bound: the best that is known of even fewer
+                found = min((fit for fit in self.fits.values() if fit.causes <= frozenset(less)),
+                            key=lambda fit: fit.cost)
+        return found
 
 
 def _kinds(effects):
