@@ -73,7 +73,7 @@ class Engine:
     def __init__(self, record, axis, baseline, used, base=None, candidates=(), log=None, step=None,
                  limit=None):
         self.problem = Problem(record, axis, baseline, used, limit)
-        self._part = None
+        self.part = None
         self.uncontested, self.best = set(), None
         self._step = step
         self._wanted = used
@@ -96,7 +96,7 @@ class Engine:
                                         self.floor**2 * self.problem.count)
 
     def run(self, seed=None):
-        """The smallest set of causes that describes the record.
+        """The smallest set of causes that describes the record; of a long one, its `part`.
 
         Parameters
         ----------
@@ -109,23 +109,27 @@ class Engine:
         """
         p = self.problem
         if len(p.record) > _LONG:
-            # where the motion is strongest is enough to find most causes
-            part = strongest_stretch(p.record.reference[:, p.axis], _LONG // 2)
-            self._part = Engine(p.record.part(part), p.axis, p.baseline, self._wanted[part],
-                                self.search.base, self.search.candidates, self.search.log,
-                                self._step, p.limit)
-            found = self._part.run(seed)
-            self.uncontested = self._part.uncontested
-            seed = {cause: effect for cause, effect in found.effects.items()
-                    if cause not in self.search.base}
-            # what a part shows is sought there; the whole is searched for what takes time to show
-            self.search.candidates = [cause for cause in self.search.candidates
-                                      if effect_of(cause).shows_with_time]
-            return self.search.run(self.threshold, self.promises, self.noise_only, seed,
-                                   most=_SLOW)
+            # where the motion is strongest is enough to find most causes, and to judge them
+            rows = strongest_stretch(p.record.reference[:, p.axis], _LONG // 2)
+            self.part = Engine(p.record.part(rows), p.axis, p.baseline, self._wanted[rows],
+                               self.search.base, self.search.candidates, self.search.log,
+                               self._step, p.limit)
+            return self.part.run(seed)
         self.best = self.compete(self.search.run(self.threshold, self.promises, self.noise_only,
-                                             seed))
+                                                 seed))
         return self.best
+
+    def whole(self, effects):
+        """The set that a part of a long record has shown, fitted to the whole.
+
+        Only what takes time to show is added.
+        """
+        known = {cause: effect for cause, effect in effects.items()
+                 if cause not in self.search.base}
+        self.search.candidates = [cause for cause in self.search.candidates
+                                  if effect_of(cause).shows_with_time]
+        self.uncontested = self.part.uncontested
+        return self.search.grow([known], self.threshold, self.promises, self.noise_only, _SLOW)
 
     def score(self, fitted, variance):
         """Cost with a penalty for each parameter, in units of the noise's variance."""
@@ -175,10 +179,29 @@ class Engine:
         return any(special_case(effect, stds.get(cause, {}), core)
                    for cause, effect in fitted.effects.items())
 
+    def instead(self, best, unwanted):
+        """A set that another cause describes better where some are not wanted; or the rest.
+
+        Parameters
+        ----------
+        best : Fitted
+        unwanted : set of str
+        """
+        rest = self.search.fit({cause: effect for cause, effect in best.effects.items()
+                                if cause not in unwanted})
+        self.search.candidates = [c for c in self.search.candidates if c not in unwanted]
+        if self.problem.limit.ends_search("causes in the place of doubtful ones were not tried"):
+            return rest
+        begun = [self.search.begun(rest, cause, begin) for cost, cause, begin in
+                 self.search.screen(rest)[:_RIVALS]
+                 if cause not in unwanted and self.promises(rest, cost)]
+        found = next(iter(self.search.fit_all(begun)), rest)
+        return found if rest.cost - found.cost > self.threshold(found) else rest
+
     def rivals(self, best, cause):
         """Sets without a cause, no larger than the best, by score; (margin, causes)."""
-        if self._part and cause in self._part.best.effects:
-            return self._part.rivals(self._part.best, cause)
+        if self.part and cause in self.part.best.effects:
+            return self.part.rivals(self.part.best, cause)
         variance = best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
         own = self.score(best, variance)
         found = [(self.score(fit, variance) - own, fit.causes) for fit in
@@ -213,8 +236,11 @@ class Engine:
 
     @functools.cached_property
     def _division(self):
+        """Of the record, or where it is long of the part with the strongest motion."""
         p = self.problem
-        return Division(p.record.reference, p.record.valid, p.rate, p.axis)
+        self._parted = strongest_stretch(p.record.reference[:, p.axis], _LONG)
+        return Division(p.record.reference[self._parted], p.record.valid[self._parted], p.rate,
+                        p.axis)
 
     def established_noise(self, fitted, stated_std=None):
         """`EstablishedNoise` of the record, beside a fit."""
@@ -223,16 +249,15 @@ class Engine:
                                  p.record.sensor_std, stated_std, None, self._division.period)
 
     def budget(self, fitted):
-        """`Budget` of what a fit leaves, of all samples that are there; None without time for it.
-        """
+        """`Budget` of what a fit leaves, of all samples that are there."""
         p = self.problem
         if fitted.causes in self._budgets:
             return self._budgets[fitted.causes]
-        if p.limit.ends_judging("the error budget was left out"):
-            return None
         residual = np.where(p.record.valid, p.measured - fitted.output, 0.0)
         residual[:p.edge] = residual[len(residual) - p.edge:] = 0.0
-        self._budgets[fitted.causes] = self._division.of(residual, p.measured, fitted.output)
+        division = self._division
+        self._budgets[fitted.causes] = division.of(*(
+            values[self._parted] for values in (residual, p.measured, fitted.output)))
         return self._budgets[fitted.causes]
 
     def learnt(self, fitted):

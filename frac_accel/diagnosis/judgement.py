@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -27,12 +28,18 @@ _AS_NOISE = 1.2
 # noise.
 _PART = 0.1
 _PART_AT_LEAST = 0.03
+# Times that another set is looked for in which no cause is doubtful.
+_AGAIN = 2
 # Verdicts that leave something to be described.
 _INCOMPLETE = ("unexplained", "partly_explained")
+# Samples of a stretch, and share of a record for which it must move, so that the size of what is
+# left can be compared with the motion's: not in a shock.
+_STRETCH = 64
+_LASTS = 0.1
 # Share of the excess power that rounds to nothing.
 _NOTHING = 0.005
-# Times what is left that is no noise by which a cause must explain more.
-_WEIGHS = 1.5
+# Times the RMS of what is left that is no noise by which a cause must explain more: tenfold in power.
+_WEIGHS = 3.0
 # Standard uncertainties by which a delay below zero is one.
 _ACAUSAL = 3.0
 # Share of the baseline's excess power that may be left where causes are named.
@@ -243,12 +250,19 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
     -------
     Diagnosis
     """
-    best, gains = _relevant(engine, _mirrored(engine, best))
-    left = engine.left(best)
-    noise = engine.established_noise(best, noise_std)
-    stds = engine.uncertainties(best)
-    doubts = _doubts(engine, best, gains, stds, left, noise)
-    findings, suspects = [], []
+    known, doubted = {}, {}
+    if engine.part:
+        shorter, doubted = _settled(engine.part, best, noise_std)
+        engine.part.best = shorter.best
+        known = {cause: g for cause, g in shorter.gains.items() if cause not in shorter.doubts}
+        doubted |= shorter.doubts
+        best = engine.whole({cause: effect for cause, effect in shorter.best.effects.items()
+                             if cause not in shorter.doubts})
+    settled, more = _settled(engine, best, noise_std, known)
+    best, gains, left, noise, stds, doubts = settled
+    doubted |= more
+    findings = []
+    suspects = [_suspect({cause}, 0.0, words) for cause, words in doubted.items()]
     for cause, g in gains.items():
         mirror = best.effects[cause].mirrors
         rivals = [(margin, causes) for margin, causes in engine.rivals(best, cause)
@@ -269,11 +283,55 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
     return _verdict(engine, best, left, findings, suspects, found, noise)
 
 
-def _relevant(engine, best):
+class Examined(NamedTuple):
+    """A set of causes with all that its judgement rests on."""
+
+    best: object
+    gains: dict
+    left: object
+    noise: object
+    stds: dict
+    doubts: dict
+
+
+def _settled(engine, best, noise_std, known=None):
+    """A set in which as little as possible is doubtful, and what was dropped for it, in words.
+
+    Parameters
+    ----------
+    known : dict of str to Gain, optional
+        Causes that a part of the record has shown already, with their gains there.
+    """
+    known, dropped = known or {}, {}
+    here = _examined(engine, best, noise_std, known)
+    for _ in range(_AGAIN):
+        # what cannot be named must not stand in the way of what can
+        unwanted = {cause for cause in here.doubts if cause not in engine.uncontested}
+        if not unwanted:
+            break
+        there = _examined(engine, engine.instead(here.best, unwanted), noise_std, known)
+        if there.doubts or not there.gains.keys() - here.gains.keys():
+            break
+        dropped.update({cause: here.doubts[cause] for cause in unwanted})
+        here = there
+    return here, dropped
+
+
+def _examined(engine, best, noise_std, known):
+    best, gains = _relevant(engine, _mirrored(engine, best), known)
+    left = engine.left(best)
+    noise = engine.established_noise(best, noise_std)
+    stds = engine.uncertainties(best)
+    judged = {cause: g for cause, g in gains.items() if cause not in known}
+    return Examined(best, gains, left, noise, stds,
+                    _doubts(engine, best, judged, stds, left, noise))
+
+
+def _relevant(engine, best, known):
     """A fit without the causes that explain nothing of held-out data, and the gains of the rest."""
     base = engine.search.base
     while True:
-        gains = {cause: engine.held_out(best, cause)
+        gains = {cause: known[cause] if cause in known else engine.held_out(best, cause)
                  for cause in best.effects if cause not in base}
         idle = [cause for cause, g in gains.items()
                 if g.reduction < _RELEVANT or g.ci95[0] <= 0]
@@ -387,7 +445,8 @@ def _verdict(engine, best, left, findings, suspects, found, noise):
         findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
                     if f.cause in fitted.effects else f for f in findings]
         fraction = remaining(fitted)
-    after = _rms(p.measured - engine.learnt(fitted).output, rest)
+    after = before if fitted.causes == baseline.causes else _rms(
+        p.measured - engine.learnt(fitted).output, rest)
     # what the record shows by itself, such as scattered stamps, is no part of the model
     by_itself = [f.gain.after for f in findings if f.cause not in fitted.effects]
     accounted = _accounted(min([after, *by_itself]), p, noise)
@@ -494,6 +553,15 @@ def _confidence(margin):
     return float(1 / (1 + np.exp(-min(margin, 1400.0) / 2)))
 
 
+def _moving_share(reference):
+    """Share of a record for which the reference moves: its mean power's square over the mean square
+    of the power, in stretches."""
+    count = max(len(reference) // _STRETCH, 1)
+    moving = (reference - reference.mean())[:count * _STRETCH].reshape(count, -1)
+    power = np.mean(np.square(moving), axis=1)
+    return float(power.mean()**2 / max(np.mean(power**2), 1e-300))
+
+
 def _certainty(g):
     """Chance that a gain is above zero, as its bootstrap interval has it."""
     std = max((g.ci95[1] - g.ci95[0]) / 3.92, 1e-12)
@@ -538,7 +606,8 @@ def _read_off(engine, best, found, shown, sensor, left):
                 engine.coarse_step(best) is not None)
     # what the size of a residual tells presumes that it is noise, or bursts of it
     parts = _structured(engine.budget(best))
-    is_noise = all(part == "bursts" for _, part in parts)
+    is_noise = all(part == "bursts" for _, part in parts) \
+        and _moving_share(p.record.reference[:, p.axis]) > _LASTS
     for cause, cls in known_effects().items():
         recognised = cls.recognised(seen, shown.get(cause)) if cls.read_off else None
         if recognised is None or (cause not in shown and not is_noise):

@@ -234,8 +234,8 @@ class Search:
             effect = dataclasses.replace(effect, **{start.parameter: float(scaled)})
         return cost, cause, effect
 
-    def run(self, threshold, promises, done, seed=None, most=_MOST):
-        """Grow sets of causes until nothing is gained; the best set of each size.
+    def run(self, threshold, promises, done, seed=None):
+        """Grow sets of causes until nothing is gained, and leave out what is not needed.
 
         Parameters
         ----------
@@ -247,14 +247,17 @@ class Search:
             True for a fit that leaves nothing but noise.
         seed : dict of str to Effect, optional
             Causes to begin with, besides none.
-        most : int
-            Largest number of causes to be added.
         """
-        beam = [self.fit(self.base)]
-        seeds = [seed] if seed else []
-        if most > 1 and not done(beam[0]):
-            seeds.append(self._everyday(beam[0]))
-        beam = sorted([*beam, *(self.fit({**self.base, **begin}) for begin in seeds if begin)],
+        bare = self.fit(self.base)
+        seeds = [{}, seed or {}]
+        if not done(bare):
+            seeds.append(self._everyday(bare))
+        return self.prune(self.grow([begin for i, begin in enumerate(seeds) if begin or not i],
+                                    threshold, promises, done, _MOST), threshold)
+
+    def grow(self, seeds, threshold, promises, done, most):
+        """The best set that grows from any of some; `most` is the number of causes to be added."""
+        beam = sorted((self.fit({**self.base, **begin}) for begin in seeds),
                       key=lambda fit: fit.cost)
         best = beam[0]
         for added in range(most):
@@ -276,7 +279,7 @@ class Search:
             beam = [fit for fit in fits[:_BEAM] if fit.cost <= _HOPELESS * best.cost]
             if added >= 2 and gained < _STUCK and not done(best):
                 break
-        return self.prune(best, threshold)
+        return best
 
     def _everyday(self, fitted):
         """Causes that are common and cheap, each from its best start.

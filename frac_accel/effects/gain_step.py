@@ -16,6 +16,7 @@ class GainStep(Effect):
     cause = "gain_step"
     stage = GAIN
     explanation = "The sensitivity jumps at one instant."
+    shows_with_time = True
     experiment = ("Look at cable, supply, range setting and mount for what happened at that "
                   "instant, and repeat before and after handling them.")
 

@@ -14,6 +14,7 @@ class OffsetDrift(Effect):
     cause = "offset_drift"
     stage = OFFSET
     explanation = "The zero of the output drifts with time."
+    shows_with_time = True
     experiment = ("Record at rest and at constant temperature for longer: a drifting zero goes on "
                   "with time.")
 

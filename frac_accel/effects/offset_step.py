@@ -16,6 +16,7 @@ class OffsetStep(Effect):
     cause = "offset_step"
     stage = OFFSET
     explanation = "The zero of the output jumps at one instant."
+    shows_with_time = True
     experiment = ("Look at cable, supply and mount for what happened at that instant, and record "
                   "at rest before and after handling them.")
 

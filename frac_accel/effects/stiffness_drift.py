@@ -28,6 +28,7 @@ class StiffnessDrift(Effect):
     cause = "stiffness_drift"
     stage = CORE
     explanation = "The natural frequency drifts with time, as that of a spring that ages or warms."
+    shows_with_time = True
     experiment = ("Excite around the resonance at the beginning and at the end of a long record: "
                   "its frequency has moved, and the gain far below it has not.")
 

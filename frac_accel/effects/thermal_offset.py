@@ -19,6 +19,7 @@ class ThermalOffset(Effect):
     stage = OFFSET
     explanation = "The zero of the output changes with temperature."
     needs_temperature = True
+    shows_with_time = True
     experiment = ("Run a temperature cycle at rest, and record the temperature: the zero comes "
                   "back with it, unlike a drift.")
 

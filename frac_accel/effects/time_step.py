@@ -19,6 +19,7 @@ class TimeStep(Effect):
     cause = "time_step"
     stage = DELAY
     explanation = "The stamps jump against the motion at one instant, as where a clock is set."
+    shows_with_time = True
     experiment = ("Number the samples at their source, and record a sharp event before and after: "
                   "the numbers go on evenly where the stamps jump.")
 
