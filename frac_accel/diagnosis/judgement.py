@@ -38,7 +38,7 @@ _STRETCH = 64
 _LASTS = 0.1
 # Share of the excess power that rounds to nothing.
 _NOTHING = 0.005
-# Times the RMS of what is left that is no noise by which a cause must explain more: tenfold in power.
+# A cause must explain this many times the RMS of what is left that is no noise: tenfold in power.
 _WEIGHS = 3.0
 # Standard uncertainties by which a delay below zero is one.
 _ACAUSAL = 3.0
