@@ -30,6 +30,9 @@ WORDS = {
 # Lags [samples] of the filters that are tried: ahead, behind.
 _LENGTHS = ((0, 0), (-1, 2), (-4, 8), (-12, 24), (-32, 96), (-64, 448), (-64, 960))
 _ALWAYS = 5
+# The same, and how many of those lengths there are, where it must be quick.
+_ALWAYS_QUICK = 2
+_QUICK_LENGTHS = 5
 _SHAPE_LENGTHS = ((0, 0), (-1, 2), (-4, 12))
 # A filter of the likeliest shapes that may ring as the sensor does.
 _RINGING = (2, (-16, 112))
@@ -127,9 +130,12 @@ class Division:
         False where a sample does not count.
     sampling_rate_hz : float
     axis : {0, 1, 2}
+    quick : bool
+        Whether the longest filters are left out, and fewer are tried where short ones take nothing.
     """
 
-    def __init__(self, reference, used, sampling_rate_hz, axis):
+    def __init__(self, reference, used, sampling_rate_hz, axis, quick=False):
+        self.quick = quick
         self.used = np.asarray(used, bool)
         if not self.used.any():
             self.used = np.ones(len(self.used), bool)
@@ -314,7 +320,7 @@ class _One:
                 best, best_gain, worse = (name, predicted, size), gains, 0
             else:
                 worse += 1
-                if worse > 1 and place >= _ALWAYS:
+                if worse > 1 and place >= (_ALWAYS_QUICK if self.r.quick else _ALWAYS):
                     break
         if first is None:
             return None
@@ -345,7 +351,7 @@ class _One:
         r = self.r
         if not r.moves:
             return
-        for length in _LENGTHS:
+        for length in _LENGTHS[:_QUICK_LENGTHS] if r.quick else _LENGTHS:
             if r.fits(*_span(length), self.step):
                 yield length, _span(length)[0], lambda length=length: self._reference_filters(
                     length).predict(target, self.flagged)
@@ -384,7 +390,7 @@ class _One:
         for output in self._outputs():
             inputs = make(output, r.used)
             trials = [(count, length) for length in _SHAPE_LENGTHS for count in (1, len(inputs))]
-            for count, length in (*trials, _RINGING):
+            for count, length in trials if r.quick else (*trials, _RINGING):
                 size, span = _span(length)
                 if r.fits(count * size, span, self.step):
                     yield (count, length), count * size, functools.partial(

@@ -238,9 +238,9 @@ class Engine:
     def _division(self):
         """Of the record, or where it is long of the part with the strongest motion."""
         p = self.problem
-        self._parted = strongest_stretch(p.record.reference[:, p.axis], _LONG)
+        self._parted = strongest_stretch(p.record.reference[:, p.axis], _LONG // 2)
         return Division(p.record.reference[self._parted], p.record.valid[self._parted], p.rate,
-                        p.axis)
+                        p.axis, quick=True)
 
     def established_noise(self, fitted, stated_std=None):
         """`EstablishedNoise` of the record, beside a fit."""

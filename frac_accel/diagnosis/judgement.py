@@ -351,12 +351,14 @@ def _doubts(engine, best, gains, stds, left, noise):
         words = undetermined(best.effects[cause], *zip(*places), stds[cause], core)
         if words:
             doubts[cause] = words
-    unexplained = _no_noise(engine, best, left)
-    for cause, g in gains.items():
-        takes = float(np.sqrt(max(g.before**2 - g.after**2, 0.0)))
-        if takes < _WEIGHS * unexplained:
-            doubts.setdefault(cause, f"what it explains ({takes:.3g} RMS) is no more than what is "
-                                     f"left unexplained ({unexplained:.3g} RMS)")
+    takes = {cause: float(np.sqrt(max(g.before**2 - g.after**2, 0.0)))
+             for cause, g in gains.items()}
+    if min(takes.values(), default=np.inf) < _WEIGHS * left.rms:
+        unexplained = _no_noise(engine, best, left)
+        takes = {cause: rms for cause, rms in takes.items() if rms < _WEIGHS * unexplained}
+        for cause, rms in takes.items():
+            doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) does not stand out of "
+                                     f"what is left unexplained ({unexplained:.3g} RMS)")
     for cause, words in _acausal(engine, best, stds).items():
         doubts.setdefault(cause, words)
     for pair in cancelling({cause: engine.added(best, cause) for cause in gains}):
