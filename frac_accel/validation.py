@@ -132,6 +132,9 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     parts = [*_corrected(corrector, sensor, temperature_at), corrector.finish()]
     stamps, values = (np.concatenate([getattr(part, name) for part in parts])
                       for name in ("stamps_ns", "values"))
+    if corrector.design is None:
+        raise FracAccelError("the stamps of the sensor's samples tell no rate: most samples are "
+                             "missing between them")
     if not len(stamps):
         raise FracAccelError(f"{len(sensor.stamps_ns)} samples are fewer than the filter needs to "
                              f"warm up ({corrector.design.warm_up_samples})")

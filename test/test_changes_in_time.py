@@ -79,10 +79,7 @@ def test_corrector_takes_it_out_however_the_stream_is_cut(cause):
     assert (variance > 0).all()
 
 
-@pytest.mark.parametrize("cause", [
-    pytest.param(cause, marks=pytest.mark.xfail(
-        reason="ties with reference_ac_coupling, whose integral of the reference's mean is a ramp"))
-    if cause == "offset_drift" else cause for cause in CAUSES])
+@pytest.mark.parametrize("cause", CAUSES)
 @pytest.mark.parametrize("seed", (3, 4))
 def test_found_again_and_nothing_else(cause, seed):
     t, reference, values = record(cause, seed)

@@ -15,7 +15,8 @@ def test_damaged_inputs_are_refused_or_worked_on(group):
 
 
 # Numbers of cases that once went wrong.
-ONCE_WRONG = [63, 89, 1036, 1091, 1109, 1141, 1347, 1394, 10105, 11442, 11472, 11552, 11658]
+ONCE_WRONG = [45, 63, 89, 99, 1036, 1091, 1109, 1141, 1347, 1394, 10105, 11442, 11472, 11552,
+              11658]
 
 
 def test_what_once_went_wrong_does_not_again():

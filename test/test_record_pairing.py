@@ -271,7 +271,7 @@ def test_a_sensor_is_identified_across_rates(rates):
         assert result.parameters[name]["value"] == pytest.approx(sensor.core[name], rel=5e-3)
     delay = result.parameters["delay_s"]["value"]
     assert delay == pytest.approx(sensor.effects["time_delay"]["delay_s"], abs=3e-5)
-    found = validate(*topics, result.model)
+    found = validate(tuple(topics), result.model)
     assert found.simulation.total.nrmse < 0.01
     assert found.comparison.corrected.total.nrmse < 0.03
     assert found.comparison.corrected.total.band_hz[1] <= 0.4 * min(rates) + 1e-9

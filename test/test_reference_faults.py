@@ -40,7 +40,7 @@ def test_found_and_validated(cause, seed):
     parameter = found.findings[0].as_dict()["parameters"][FAULTS[cause][0]]
     assert abs(parameter["value"] - value) < 5 * parameter["std"]
     assert [fault.cause for fault in found.model.reference_faults] == [cause]
-    errors = validate(*samples(*pair), found.model).simulation.bands
+    errors = validate(samples(*pair), found.model).simulation.bands
     # what drifts below the excited band, the reference does not tell
     assert all(band.nrmse < 5e-3 + 3 * noise for band in errors[1:])
     assert found.findings[0].confusable_with == (

@@ -31,7 +31,8 @@ _CORRECTED, _LONG = 5e-3, 4000
 _FORCED = 0.25
 
 _ON_SAMPLES = ("simulate", "invert", "live", "simulate_axes", "invert_axes")
-_ON_MOTION = ("transfer_function", "pure_delay_s", "clock_ratio", "change_core", "add_force")
+_ON_MOTION = ("transfer_function", "pure_delay_s", "clock_ratio", "change_core", "add_force",
+              "change_motion")
 
 
 def stays_finite(cls, draws):
@@ -143,7 +144,8 @@ def _run(step, columns, there, edges):
 
 def inverts_samples(cls, draws):
     """What acts on samples is undone, as far as the stated variance and the limits allow."""
-    if not _overrides(cls, _ON_SAMPLES):
+    # samples alone do not show what depends on the motion between them
+    if not _overrides(cls, _ON_SAMPLES) or _overrides(cls, ("change_motion",)):
         return
     n = 2000
     for _ in range(_INVERSES):

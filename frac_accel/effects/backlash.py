@@ -40,11 +40,13 @@ class Backlash(Effect):
 class _Ends:
     """Motion from the output: at the end of the play that the output's direction tells.
 
-    While the output stays, or noise hides its direction, all that is known is the play's width.
+    While the output stays or turns, or noise hides its direction, all that is known is the play's
+    width.
     """
 
     def __init__(self, half):
         self._half, self._last = half, None
+        self._moved = np.zeros(1)
 
     def simulate(self, values, circumstances):
         return values
@@ -57,9 +59,12 @@ class _Ends:
         last_variance = variance[:1] if self._last is None else self._last[1]
         moved = np.diff(np.concatenate([last, values]))
         noise = variance + np.concatenate([last_variance, variance[:-1]])
-        self._last = values[-1:].copy(), variance[-1:].copy()
+        # of a motion that turns between two samples, the mean direction counts
+        bend = np.diff(np.concatenate([self._moved, moved]))
+        spread = noise + bend**2 / 12
+        self._last, self._moved = (values[-1:].copy(), variance[-1:].copy()), moved[-1:]
         with np.errstate(divide="ignore", invalid="ignore"):
-            sign = erf(moved / np.sqrt(2 * noise))
-        sign = np.where(noise > 0, sign, np.sign(moved))
+            sign = erf(moved / np.sqrt(2 * spread))
+        sign = np.where(spread > 0, sign, np.sign(moved))
         return (values + self._half * sign,
                 variance + self._half**2 / 3 * (1 - sign**2))

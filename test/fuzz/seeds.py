@@ -117,6 +117,10 @@ def _axis(rng):
 
 def _value(field, rng):
     limits = field.metadata
+    if limits.get("list"):
+        return rng.normal(size=rng.integers(1, 4)).tolist()
+    if limits.get("choices"):
+        return str(rng.choice(limits["choices"]))
     low = next((limits[key] for key in ("above", "minimum") if limits[key] is not None), None)
     high = next((limits[key] for key in ("below", "maximum") if limits[key] is not None), None)
     size = float(10 ** rng.uniform(-6, 3))
