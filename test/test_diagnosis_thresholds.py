@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "diagnosis.md"
-ROWS = re.findall(r"^\| `(\w+)\.(\w+)` \| (\S+) \|", PAGE.read_text(encoding="utf-8"), re.M)
+ROWS = re.findall(r"^\| `([\w.]+)\.(\w+)` \| (\S+) \|", PAGE.read_text(encoding="utf-8"), re.M)
 
 
 def test_the_page_has_thresholds():
@@ -16,5 +16,5 @@ def test_the_page_has_thresholds():
 
 @pytest.mark.parametrize("module, name, value", ROWS)
 def test_threshold(module, name, value):
-    path = "frac_accel.diagnosis" + ("" if module == "diagnosis" else f".{module}")
-    assert getattr(importlib.import_module(path), name) == float(value)
+    path = module if module.startswith(("budget.", "diagnosis")) else f"diagnosis.{module}"
+    assert getattr(importlib.import_module(f"frac_accel.{path}"), name) == float(value)
