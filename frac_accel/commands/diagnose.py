@@ -20,6 +20,9 @@ from ._common import (
     write_json,
 )
 
+# Share of what is left from which a part of the error budget is told.
+_SHOWN = 0.01
+
 
 def add_arguments(parser):
     """Options of the verb."""
@@ -85,6 +88,7 @@ def table(found, axis):
     lines.append(f"the model in use leaves {found.baseline['rmse']:.4g} "
                  f"({found.baseline['nrmse']:.3%} of the output) on held-out data; noise "
                  f"{found.baseline['noise_rms']:.4g}")
+    lines += _parted(found, "baseline", "of what it leaves")
     for finding in found.findings:
         lines.append(f"{finding.cause}: {finding.effect.explanation}")
         for name, entry in finding.as_dict()["parameters"].items():
@@ -101,4 +105,13 @@ def table(found, axis):
         lines.append(f"the extended model leaves {found.extended['rmse']:.4g} "
                      f"({found.extended['nrmse']:.3%}); {found.unexplained_fraction:.1%} of the "
                      "error's power above the noise is unexplained")
+        lines += _parted(found, "extended", "of what that leaves")
     return "\n".join(lines)
+
+
+def _parted(found, of, words):
+    """The error budget of one model as a line; none where there is no budget."""
+    parts = [entry for entry in found.budget if entry["of"] == of and entry["share"] >= _SHOWN]
+    parts.sort(key=lambda entry: -entry["share"])
+    listed = ", ".join(f"{entry['share']:.0%} {entry['part']}" for entry in parts)
+    return [f"{words}: {listed} (docs/budget.md)"] if listed else []

@@ -1,5 +1,6 @@
 """The page of a diagnosis: the verdict, its evidence, what was considered and what is left."""
 
+from ..budget import WORDS
 from ..parameters import parameter_fields
 from .diagnosis_figures import discrepancy
 from .figures import COVERAGE_FACTOR
@@ -8,6 +9,8 @@ from .quantity import percent, rounded
 from .rivals import rivals
 from .signals import sentence
 
+# Share of what is left from which a part of the error budget is shown.
+_SHOWN = 0.001
 _VERDICTS = {"consistent": "Consistent", "explained": "Explained",
              "partly_explained": "Partly explained", "unexplained": "Unexplained",
              "undecided": "Undecided", "insufficient_data": "Insufficient data"}
@@ -33,6 +36,8 @@ def diagnosis_page(found, provenance=None):
     if seen is None:
         _data(page.section("Data"), found)
         return page
+    if found.budget:
+        _budget(page.section("Error budget"), found)
     discrepancy(page.section("What the simulation gets wrong"), found)
     if found.findings:
         _causes(page.section("Causes"), found)
@@ -62,7 +67,29 @@ def _verdict(section, found):
             f"wrong by {after['rmse']:.4g} ({percent(after['nrmse'])} of the output) on the same "
             f"data. {_unexplained(found)}")
     for suspect in found.suspects:
-        section.text(f"Suspected, not named: {_listed(suspect['causes'])}.")
+        section.text(f"Suspected, not named: {_listed(suspect['causes'])}: {suspect['reason']}.")
+
+
+def _budget(section, found):
+    shares = {(entry["of"], entry["part"]): entry for entry in found.budget}
+    rows = []
+    for part, words in WORDS.items():
+        entries = [shares.get((of, part)) for of in ("baseline", "extended")]
+        if any(entry and entry["share"] >= _SHOWN for entry in entries):
+            rows.append([part, words, *(_share(entry) for entry in entries)])
+    section.table(["part", "what it is", "model in use", "extended model"], rows,
+                  "Shares of the power that each model leaves, with 95 % intervals. Each is judged "
+                  "on stretches that it was not fitted to, so that noise alone gives 0.")
+    noise = found.established_noise
+    section.text(f"Noise is established: {noise['rms']:.4g} output units (RMS), by {noise['by']}."
+                 if noise["by"] else "Nothing in the record shows how large the noise is.")
+
+
+def _share(entry):
+    if entry is None:
+        return "–"
+    low, high = entry["ci95"]
+    return f"{entry['share']:.1%} ({low:.1%} to {high:.1%})"
 
 
 def _short(finding):
