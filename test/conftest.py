@@ -1,4 +1,4 @@
-"""Which tests `make check` runs."""
+"""Which tests `make check` runs, and which of many draws `make test` spares."""
 
 import pytest
 
@@ -13,11 +13,30 @@ SLOW = """
     test_plug_in_of_the_documentation_as_a_third_party_installs_it test_walk_through_of_contributing
     test_the_package_can_be_imported_before_and_after test_random_damage_raises_bag_errors_only
 """.split()
+# Files whose tests draw many records or sensors: `make test` runs the first draw of each test, and
+# `make test-all` the others.
+MANY_DRAWS = """
+    axis_monitors backlash budget changes_in_time corrected_uncertainty core_response
+    corrector_uncertainty diagnosis_data_checks diagnosis_exchanged diagnosis_leftover
+    diagnosis_steps domains_agree effect_checks effects_correction effects_simulation
+    effects_streaming empirical_link fit_starts further_forces gap_coverage identify_arx
+    identify_auto identify_fractional identify_gain identify_general_equation identify_oscillator
+    identify_records inverse_design linear_causes misalignment output_variance plausibility
+    real_records record_orientation record_pairing reference_faults residual_causes rig_accuracy
+    rig_road rig_second_set rig_uncatalogued simulation_accuracy spring_uncertainty
+    streaming_identity write_errors
+""".split()
 
 
 def pytest_collection_modifyitems(items):
     """Mark them, but nothing that is long or needs ROS or the real records."""
+    seen = set()
     for item in items:
+        if item.path.stem.removeprefix("test_") in MANY_DRAWS:
+            draw = item.path, item.originalname
+            if draw in seen:
+                item.add_marker(pytest.mark.long)
+            seen.add(draw)
         if item.path.stem.removeprefix("test_") in FAST and item.originalname not in SLOW \
                 and not any(map(item.get_closest_marker, ("long", "ros", "real_data"))):
             item.add_marker(pytest.mark.fast)
