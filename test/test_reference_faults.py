@@ -43,8 +43,9 @@ def test_found_and_validated(cause, seed):
     errors = validate(samples(*pair), found.model).simulation.bands
     # what drifts below the excited band, the reference does not tell
     assert all(band.nrmse < 5e-3 + 3 * noise for band in errors[1:])
-    assert found.findings[0].confusable_with == (
-        ["time_delay"] if cause == "reference_delay" else [])
+    # a step of the sensor's stamps right at the start is a delay, too
+    assert {*found.findings[0].confusable_with} - {"time_step"} == (
+        {"time_delay"} if cause == "reference_delay" else set())
 
 
 @pytest.mark.parametrize("cause", FAULTS)
