@@ -48,8 +48,9 @@ def test_a_parameter_that_changes_nothing_stays():
 @pytest.mark.parametrize("cause", ["coulomb_friction", "hysteresis", "cubic_stiffness"])
 def test_derivatives_beside_a_force_are_those_of_a_finer_simulation(cause):
     case = draw_case(31, [cause, "core_parameter_shift", "low_pass_lag"], excitation="band_noise")
-    _, engine, _ = searched(case)
-    problem = engine.problem
+    reference, sensor, celsius = case.samples()
+    record = Record.of(reference, sensor, "x", celsius)
+    problem = Engine(record, 0, case.model(), record.valid, candidates=[cause]).problem
     effects = {name: known_effects()[name](**values)
                for name, values in case.truth.items()}
     fit = problem.fit(effects, iterations=0)
