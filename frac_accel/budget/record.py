@@ -84,7 +84,7 @@ def left_by(reference, sensor, model=None, axis="x", noise_std=None, second_sens
     residual = np.where(used, measured - simulated, 0.0)
     other = None if other_values is None else _shared_residual(
         pair, other_values, measured, column, words)
-    division = Division(pair.reference, used, pair.sampling_rate_hz, column)
+    division = Division(pair.reference, used, pair.sampling_rate_hz, column, quick=True)
     budget = division.of(residual, measured, simulated, other)
     noise = established_noise(residual, measured, pair.reference, used, pair.sampling_rate_hz,
                               pair.sensor_std, noise_std, other, division.period)
