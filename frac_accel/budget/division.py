@@ -390,7 +390,7 @@ class _One:
         for output in self._outputs():
             inputs = make(output, r.used)
             trials = [(count, length) for length in _SHAPE_LENGTHS for count in (1, len(inputs))]
-            for count, length in trials if r.quick else (*trials, _RINGING):
+            for count, length in (*trials, _RINGING):
                 size, span = _span(length)
                 if r.fits(count * size, span, self.step):
                     yield (count, length), count * size, functools.partial(
