@@ -74,7 +74,7 @@ def left_by(reference, sensor, model=None, axis="x", noise_std=None, second_sens
         If there are too few samples, none in common, or the sensor's axis never changes.
     """
     column, words = AXES.index(axis), []
-    pair = Record.of(reference, sensor, axis)
+    pair = _record(reference, sensor, axis)
     words += pair.words
     other_values = None
     if second_sensor is not None:
@@ -89,6 +89,20 @@ def left_by(reference, sensor, model=None, axis="x", noise_std=None, second_sens
     noise = established_noise(residual, measured, pair.reference, used, pair.sampling_rate_hz,
                               pair.sensor_std, noise_std, other, division.period)
     return Left(what, budget, noise, unaccounted(budget.rms, budget.output_rms, noise), words)
+
+
+def _record(reference, sensor, axis):
+    """Both on the same instants; a reference that does not move along the axis is no hindrance."""
+    refusal = None
+    for name in (axis, *(other for other in AXES if other != axis)):
+        try:
+            record = Record.of(reference, sensor, name)
+        except FracAccelError as error:
+            refusal = refusal or error
+            continue
+        if np.ptp(record.sensor[record.valid, AXES.index(axis)]):
+            return record
+    raise refusal
 
 
 def _simulated(pair, measured, model, axis, column, temperature_at):
