@@ -31,13 +31,20 @@ PATH = ("backlash",)
 # in test_residual_causes
 BY_POWER = ("sampling_jitter", "interference_bursts")
 
+# in test_linear_causes
+LINKS = ("second_resonance", "low_pass_filter", "linear_phase_filter")
+# in test_reference_faults
+OF_REFERENCE = ("reference_ac_coupling", "reference_delay", "reference_low_pass")
+# in test_empirical_link
+FITTED = ("empirical_link",)
+
 
 def test_every_effect_of_this_package_is_tested_here():
     ours = {cause for cause, effect in known_effects().items()
             if effect.__module__.startswith("frac_accel.")}
     assert ours == {*LINEAR, *ON_SAMPLES, *NONLINEAR, *CORE, *IN_TIME, *LOSSY,
                     *CHANGING, *FORCES, *TURNED,
-                    *BY_POWER, *PATH}
+                    *BY_POWER, *PATH, *LINKS, *OF_REFERENCE, *FITTED}
 
 
 @pytest.mark.parametrize("cause", rig.CAUSES)
