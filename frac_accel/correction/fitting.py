@@ -22,7 +22,7 @@ _LONGEST = 8
 STATIC = 5e-4
 _MOST_TAPS = 4096
 # Sampling rate over the band's upper end; eight times as many taps are needed at least.
-MOST_OVERSAMPLED = 5000
+MOST_OVERSAMPLED = 50_000
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

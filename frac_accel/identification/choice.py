@@ -31,9 +31,8 @@ _EDGE = 32
 def choose(data):
     """Best of the structures for one record, and why."""
     flat = flat_instead(data)
-    if flat:
-        return flat
-    chosen, best, reason = _choose_oscillator(data)
+    chosen, best, reason = (flat[0], flat[0].held_out_nrmse, flat[1]) if flat \
+        else _choose_oscillator(data)
     if linear_share(data.reference, chosen.fit.residual) < 1 - _CLEARLY**2:
         return chosen, reason
     try:
@@ -44,8 +43,9 @@ def choose(data):
     if not arx.held_out_nrmse < _CLEARLY * best:
         return chosen, (f"{reason}; a free transfer function in z does not predict clearly better: "
                         f"{held_out}")
-    return arx, ("it predicts clearly better than an oscillator with classical or fractional "
-                 f"damping: {held_out}; something else acts, which its coefficients cannot name")
+    others = "a gain" if flat else "an oscillator with classical or fractional damping"
+    return arx, (f"it predicts clearly better than {others}: {held_out}; something else acts, which "
+                 "its coefficients cannot name")
 
 
 def choose_classical(data):
