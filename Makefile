@@ -7,7 +7,7 @@ unexport PYTHONPATH LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DELETE_ON_ERROR:
-.PHONY: setup demo check test test-all test-oldest lint types bench soak blind fuzz browser pins clean FORCE
+.PHONY: setup demo check test test-all test-others test-oldest lint types bench soak blind fuzz browser pins clean FORCE
 
 venv := .venv
 oldest := .venv-oldest
@@ -28,7 +28,7 @@ demo: setup
 	$(python) -m frac_accel.demo --output-dir demo_output
 
 # BLAS threads would only fight with the other worker.
-check test test-all test-oldest: export OPENBLAS_NUM_THREADS := 1
+check test test-all test-others test-oldest: export OPENBLAS_NUM_THREADS := 1
 
 # In a minute what catches most.
 check: $(venv)/.frac_accel lint types
@@ -38,9 +38,13 @@ test: setup lint types
 	$(python) $(numerical) -m "not ros and not long"
 	$(python) -m pytest -m ros
 
-# The long Monte Carlos, and everything else once more with the oldest libraries.
+# The further draws and the long Monte Carlos (hours), and the rest with the oldest libraries.
 test-all: setup
 	$(python) $(numerical) -m "not ros and long"
+	@$(MAKE) --no-print-directory test-others
+
+# What make test runs without ROS, once more with the oldest libraries, where a Python has them.
+test-others:
 	@if $(find_oldest) >/dev/null; then $(MAKE) --no-print-directory test-oldest; else \
 	    echo "so the numerical suite was not run with numpy 1.26.4 and scipy 1.11.4"; fi
 

@@ -44,8 +44,8 @@ def choose(data):
         return chosen, (f"{reason}; a free transfer function in z does not predict clearly better: "
                         f"{held_out}")
     others = "a gain" if flat else "an oscillator with classical or fractional damping"
-    return arx, (f"it predicts clearly better than {others}: {held_out}; something else acts, which "
-                 "its coefficients cannot name")
+    return arx, (f"it predicts clearly better than {others}: {held_out}; something else acts, "
+                 "which its coefficients cannot name")
 
 
 def choose_classical(data):
