@@ -107,7 +107,8 @@ def test_figures_show_both_models_against_the_true_noise(explained):
      ["Extended model", "does not differ from noise"]),
     ("partly_explained", 4, ("clipping",),
      ["clipping lower", "clipping upper", "stays unexplained", "experiment that tells",
-      "Suspected, not named: offset or time_delay.", "For offset: Record at rest"], []),
+      "Suspected, not named: offset or time_delay: too weak to tell.",
+      "For offset: Record at rest"], []),
 ])
 def test_page_of_other_verdicts(verdict, seed, causes, present, absent):
     case = draw_case(seed, causes)
@@ -129,7 +130,7 @@ def test_page_of_other_verdicts(verdict, seed, causes, present, absent):
 
 def doubtful(found):
     """A diagnosis that is less sure, as a smaller effect would have left it."""
-    suspects = [{"causes": ["offset", "time_delay"], "margin": 3.2,
+    suspects = [{"causes": ["offset", "time_delay"], "margin": 3.2, "reason": "too weak to tell",
                  "experiment": separating_experiment(["time_delay", "offset"])}]
     return dataclasses.replace(found, verdict="partly_explained", suspects=suspects,
                                reason="the named causes leave a part unexplained",

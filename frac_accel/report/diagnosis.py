@@ -72,12 +72,15 @@ def _verdict(section, found):
 
 def _budget(section, found):
     shares = {(entry["of"], entry["part"]): entry for entry in found.budget}
+    # without a cause both models are one
+    models = {"baseline": "model in use", "extended": "extended model"} if found.findings else {
+        "baseline": "model in use"}
     rows = []
     for part, words in WORDS.items():
-        entries = [shares.get((of, part)) for of in ("baseline", "extended")]
+        entries = [shares.get((of, part)) for of in models]
         if any(entry and entry["share"] >= _SHOWN for entry in entries):
             rows.append([part, words, *(_share(entry) for entry in entries)])
-    section.table(["part", "what it is", "model in use", "extended model"], rows,
+    section.table(["part", "what it is", *models.values()], rows,
                   "Shares of the power that each model leaves, with 95 % intervals. Each is judged "
                   "on stretches that it was not fitted to, so that noise alone gives 0.")
     noise = found.established_noise
