@@ -131,7 +131,7 @@ class Division:
     sampling_rate_hz : float
     axis : {0, 1, 2}
     quick : bool
-        Whether the longest filters are left out, and fewer are tried where short ones take nothing.
+        Whether long filters are tried only where shorter ones keep gaining.
     """
 
     def __init__(self, reference, used, sampling_rate_hz, axis, quick=False):
@@ -304,7 +304,7 @@ class _One:
         And the one that the share is estimated with, where none takes anything.
         """
         judged = self.counted
-        best = first = None
+        best = first = self.leading = None
         best_gain, left = np.zeros(len(self.r.blocks)), float(target @ target)
         worse = 0
         for place, (name, size, make) in enumerate(self._candidates(part, target)):
@@ -318,6 +318,7 @@ class _One:
             error = np.sqrt(len(more)) * np.std(more)
             if more.sum() > max((_BETTER if best else _ANY) * error, _WORTH * left):
                 best, best_gain, worse = (name, predicted, size), gains, 0
+                self.leading = name
             else:
                 worse += 1
                 if worse > 1 and place >= (_ALWAYS_QUICK if self.r.quick else _ALWAYS):
@@ -351,7 +352,11 @@ class _One:
         r = self.r
         if not r.moves:
             return
-        for length in _LENGTHS[:_QUICK_LENGTHS] if r.quick else _LENGTHS:
+        for place, length in enumerate(_LENGTHS):
+            # a longer one is worth its time only where the one before is the best so far
+            if r.quick and place >= _QUICK_LENGTHS and "linear" not in self.chosen \
+                    and self.leading != _LENGTHS[place - 1]:
+                return
             if r.fits(*_span(length), self.step):
                 yield length, _span(length)[0], lambda length=length: self._reference_filters(
                     length).predict(target, self.flagged)

@@ -279,8 +279,8 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
         else:
             suspects.append(_suspect({cause, *instead}, margin, "another cause explains as much"))
     findings += _moved(engine, best, loose, stds)
-    findings += _read_off(engine, best, found, shown, sensor, left)
-    return _verdict(engine, best, left, findings, suspects, found, noise)
+    return _verdict(engine, best, left, findings, suspects, found, noise,
+                    lambda fitted: _read_off(engine, fitted, found, shown, sensor))
 
 
 class Examined(NamedTuple):
@@ -365,7 +365,8 @@ def _doubts(engine, best, gains, stds, left, noise):
         for cause, other in (pair, pair[::-1]):
             doubts.setdefault(cause, f"it nearly cancels {other}: together they may stand for "
                                      "one cause that is not known")
-    if gains and (left.share > 0 or not _accounted(_rms(best.residual, p.used), p, noise)):
+    spread = float(np.std(p.measured[p.used]))
+    if gains and (left.share > 0 or not _accounted(_rms(best.residual, p.used), spread, noise)):
         for cause, words in engine.unstable(best).items():
             doubts.setdefault(cause, words)
     return {cause: words for cause, words in doubts.items() if cause in gains}
@@ -392,9 +393,8 @@ def _acausal(engine, best, stds):
                                 "has: they imitate something else")
 
 
-def _accounted(rmse, problem, noise):
-    """Whether an error is small, or no larger than noise that is established."""
-    spread = float(np.std(problem.measured[problem.used]))
+def _accounted(rmse, spread, noise):
+    """Whether an error is small beside the output's spread, or no larger than established noise."""
     return rmse <= _LITTLE * spread or (noise.rms is not None and rmse <= _AS_NOISE * noise.rms)
 
 
@@ -414,7 +414,7 @@ def _suspect(causes, margin, reason):
             "experiment": separating_experiment(causes)}
 
 
-def _verdict(engine, best, left, findings, suspects, found, noise):
+def _verdict(engine, best, left, findings, suspects, found, noise, shown_by):
     p = engine.problem
     rest = engine.held_out_rows
     spread = float(np.std(p.measured[rest]))
@@ -447,11 +447,13 @@ def _verdict(engine, best, left, findings, suspects, found, noise):
         findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
                     if f.cause in fitted.effects else f for f in findings]
         fraction = remaining(fitted)
+    # beside the model as it is in the end, not beside one with what is only suspected
+    findings = findings + shown_by(fitted)
     after = before if fitted.causes == baseline.causes else _rms(
         p.measured - engine.learnt(fitted).output, rest)
     # what the record shows by itself, such as scattered stamps, is no part of the model
     by_itself = [f.gain.after for f in findings if f.cause not in fitted.effects]
-    accounted = _accounted(min([after, *by_itself]), p, noise)
+    accounted = _accounted(min([after, *by_itself]), spread, noise)
     budget = engine.budget(fitted)
     strange = _structured(budget)
     verdict = _word(findings, suspects, complete, left.share, fraction, accounted, strange)
@@ -529,9 +531,15 @@ def _reason(verdict, nrmse, noise, accounted, strange):
             "explained": f"the named causes explain the record {to}",
             "partly_explained": "the named causes leave a part unexplained" + left,
             "unexplained": "no known cause explains what the model gets wrong" + left,
-            "undecided": f"{nrmse:.1%} of the output is unaccounted for; nothing in the record "
-                         "shows that it is noise; record the sensor at rest too, or repeat the "
-                         "same motion, or state its noise (--noise-std)"}[verdict]
+            "undecided": f"{nrmse:.1%} of the output is unaccounted for; {_unknown(noise)}; "
+                         "record the sensor at rest too, or repeat the same motion, or state its "
+                         "noise (--noise-std)"}[verdict]
+
+
+def _unknown(noise):
+    if noise.rms is None:
+        return "nothing in the record shows that it is noise"
+    return f"the noise that is established ({noise.rms:.3g} RMS, by {noise.by}) is less than that"
 
 
 def _extended(engine, effects):
@@ -599,15 +607,15 @@ def _moved(engine, best, loose, stds):
     return findings
 
 
-def _read_off(engine, best, found, shown, sensor, left):
+def _read_off(engine, fitted, found, shown, sensor):
     """Findings that the record shows by itself: limits, lattice, stamps."""
     p, findings = engine.problem, []
     rows = p.record.valid.copy()
     rows[:64] = rows[-64:] = False
-    seen = Seen(p.record, found, sensor, p.measured, best.output, rows, rows & p.used,
-                engine.coarse_step(best) is not None)
+    seen = Seen(p.record, found, sensor, p.measured, fitted.output, rows, rows & p.used,
+                engine.coarse_step(fitted) is not None)
     # what the size of a residual tells presumes that it is noise, or bursts of it
-    parts = _structured(engine.budget(best))
+    parts = _structured(engine.budget(fitted))
     is_noise = all(part == "bursts" for _, part in parts) \
         and _moving_share(p.record.reference[:, p.axis]) > _LASTS
     for cause, cls in known_effects().items():

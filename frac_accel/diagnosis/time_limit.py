@@ -3,7 +3,7 @@
 import time
 
 # Share of the budget after which nothing new is tried, so that what is known can be judged.
-_SEARCH = 0.6
+_SEARCH = 0.75
 
 
 class TimeLimit:

@@ -78,8 +78,9 @@ def flat_instead(data):
                "its parameters are open, and a gain is all that can be said")
     else:
         return None
-    return flat, (f"no resonance shows up to {highest:.4g} Hz: an oscillator at {resonance:.4g} "
-                  f"+- {std:.2g} Hz {why} (held-out residual "
+    place = f"at {resonance:.4g} +- {std:.2g} Hz" if std < resonance else "at any frequency above"
+    return flat, (f"no resonance shows up to {highest:.4g} Hz: an oscillator {place} {why} "
+                  f"(held-out residual "
                   f"{classical.held_out_nrmse:.3%} against {flat.held_out_nrmse:.3%})")
 
 
