@@ -34,15 +34,30 @@ def stopping_cleanly():
     def stop(number, frame):
         for each in numbers:
             signal.signal(each, signal.SIG_IGN)
+        _end_silently()
         raise Stopped(number)
+
+    def interrupt(number, frame):
+        _end_silently()
+        raise KeyboardInterrupt
 
     for number in numbers:
         signal.signal(number, stop)
+    interrupts = signal.getsignal(signal.SIGINT)
+    if interrupts is signal.default_int_handler:
+        signal.signal(signal.SIGINT, interrupt)
     try:
         yield
     finally:
         for number in numbers:
             signal.signal(number, signal.SIG_DFL)
+        if interrupts is signal.default_int_handler:
+            signal.signal(signal.SIGINT, interrupts)
+
+
+def _end_silently():
+    """What is torn down half made, such as a progress bar, has no say any more."""
+    sys.unraisablehook = lambda unraisable: None
 
 
 @contextlib.contextmanager

@@ -210,6 +210,7 @@ print(np.std(output - motion), np.std(error))
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
     """Environment in which the documentation's plug-in is installed, as a third party would."""
+    pytest.importorskip("setuptools")  # which pip is told not to fetch
     folder = tmp_path_factory.mktemp("plugin")
     # pip builds within the folder
     shutil.copytree(ROOT / "docs" / "own_cause", folder / "source")
