@@ -14,8 +14,6 @@ from .division import Division
 from .noise import established_noise, unaccounted
 
 _FEWEST = 32
-# Intervals of a topic's own over which its values are interpolated.
-_GAP = 2.5
 
 
 @dataclasses.dataclass(frozen=True)

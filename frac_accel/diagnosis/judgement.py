@@ -472,7 +472,7 @@ def _verdict(engine, best, left, findings, suspects, found, noise, shown_by):
         Evidence.of(engine, best, {f.cause: f.effect for f in findings}),
         noise.as_dict(), p.limit.summary(),
         [entry for of, parted in (("baseline", engine.budget(baseline)), ("extended", budget))
-         if parted is not None for entry in parted.as_list(of)])
+         for entry in parted.as_list(of)])
 
 
 def _described(engine, fitted, after):
@@ -495,8 +495,6 @@ def _described(engine, fitted, after):
 
 def _structured(budget):
     """Parts of what is left that are no noise, with their shares, the largest first."""
-    if budget is None:
-        return []
     return sorted(((entry["share"], entry["part"]) for entry in budget.parts
                    if entry["part"] != "noise" and entry["share"] > _PART
                    and entry["ci95"][0] > _PART_AT_LEAST), reverse=True)

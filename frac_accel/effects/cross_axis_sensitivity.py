@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..parameters import parameter
+from .axis_mixing import mix, mixing_matrix
 from .axis_turn import turn_of
 from .base import CROSS_AXIS, Effect
 from .fit_starts import Start
@@ -36,16 +37,8 @@ class CrossAxisSensitivity(Effect):
         return [other for other in "xyz" if other != axis and excited[other]]
 
     @classmethod
-    def matrix(cls, by_axis):
-        """3 by 3 matrix that turns outputs without cross-axis sensitivity into those with it."""
-        matrix = np.eye(3)
-        for axis, effect in by_axis.items():
-            matrix[axis] = effect.share_of_axes(axis)
-        return matrix
-
-    @classmethod
     def simulate_axes(cls, values, by_axis, circumstances):
-        return mix(values, cls.matrix(by_axis))
+        return mix(values, mixing_matrix(by_axis))
 
     @classmethod
     def invert_axes(cls, values, variance, by_axis, circumstances):
@@ -63,13 +56,8 @@ class CrossAxisSensitivity(Effect):
 
 @functools.lru_cache
 def _inverse(by_axis):
-    matrix = CrossAxisSensitivity.matrix(dict(by_axis))
+    matrix = mixing_matrix(dict(by_axis))
     if np.linalg.cond(matrix) > 1e3:
         raise ModelError("effects: cross_axis_sensitivity cannot be inverted, its axes are nearly "
                          "the same direction")
     return np.linalg.inv(matrix)
-
-
-def mix(values, matrix):
-    """values @ matrix.T, summed in a fixed order: BLAS would round by the block's length."""
-    return sum(values[:, [axis]] * matrix[:, axis] for axis in range(3))

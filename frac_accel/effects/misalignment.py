@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 
 from ..parameters import parameter
+from .axis_mixing import mix, mixing_matrix
 from .axis_turn import turn_of
 from .base import CROSS_AXIS, Effect
-from .cross_axis_sensitivity import mix
 from .fit_starts import finite
 
 _AXES = "xyz"
@@ -75,20 +75,12 @@ class Misalignment(Effect):
         return sorted({_ABOUT[frozenset(axis + other)] for other in others})
 
     @classmethod
-    def matrix(cls, by_axis):
-        """3 by 3 matrix that turns outputs of straight axes into those of the turned ones."""
-        matrix = np.eye(3)
-        for axis, effect in by_axis.items():
-            matrix[axis] = effect.share_of_axes(axis)
-        return matrix
-
-    @classmethod
     def simulate_axes(cls, values, by_axis, circumstances):
-        return mix(values, cls.matrix(by_axis))
+        return mix(values, mixing_matrix(by_axis))
 
     @classmethod
     def invert_axes(cls, values, variance, by_axis, circumstances):
-        matrix = cls.matrix(by_axis)
+        matrix = mixing_matrix(by_axis)
         if abs(np.linalg.det(matrix)) < 1e-3:
             # one axis was diagnosed alone, and is another one: that one is not known twice
             return values, variance
