@@ -133,7 +133,7 @@ class Engine:
 
     def score(self, fitted, variance):
         """Cost with a penalty for each parameter, in units of the noise's variance."""
-        return fitted.cost / variance + _CHANCE * len(fitted.unknowns)
+        return fitted.cost / variance + _CHANCE * fitted.size
 
     def compete(self, best):
         """Let every cause's nearest rivals take its place; the winner of all."""

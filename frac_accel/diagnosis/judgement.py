@@ -40,6 +40,8 @@ _LASTS = 0.1
 _NOTHING = 0.005
 # A cause must explain this many times the RMS of what is left that is no noise: tenfold in power.
 _WEIGHS = 3.0
+# As many causes that are linear filters, beside which a linear part is left, imitate another one.
+_MANY_FILTERS = 3
 # Standard uncertainties by which a delay below zero is one.
 _ACAUSAL = 3.0
 # Share of the baseline's excess power that may be left where causes are named.
@@ -359,7 +361,7 @@ def _doubts(engine, best, gains, stds, left, noise):
         for cause, rms in takes.items():
             doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) does not stand out of "
                                      f"what is left unexplained ({unexplained:.3g} RMS)")
-    for cause, words in _acausal(engine, best, stds).items():
+    for cause, words in (_acausal(engine, best, stds) | _patchwork(engine, best)).items():
         doubts.setdefault(cause, words)
     for pair in cancelling({cause: engine.added(best, cause) for cause in gains}):
         for cause, other in (pair, pair[::-1]):
@@ -378,12 +380,28 @@ def _no_noise(engine, fitted, left):
     return float(np.sqrt(max(shares))) * left.rms
 
 
+def _filters(engine, best):
+    """Causes that act as linear filters, by cause."""
+    return {cause: effect for cause, effect in best.effects.items()
+            if cause not in engine.search.base and not effect.is_constant
+            and (is_link(effect) or effect.pure_delay_s() or effect.restates_core)}
+
+
+def _patchwork(engine, best):
+    """Filters that are many and still leave a linear part."""
+    filters = _filters(engine, best)
+    if len(filters) < _MANY_FILTERS or not any(
+            part == "linear" for _, part in _structured(engine.budget(best))):
+        return {}
+    return dict.fromkeys(filters, f"{len(filters)} filters together still leave what a linear "
+                                  "filter would take: they imitate something else")
+
+
 def _acausal(engine, best, stds):
     """Links that stand beside a delay below zero: it takes back what they say too much."""
-    p, base = engine.problem, engine.search.base
-    links = [cause for cause, effect in best.effects.items() if cause not in base
-             and (is_link(effect) or effect.pure_delay_s()) and not effect.is_constant
-             and not effect.of_reference]
+    p = engine.problem
+    links = [cause for cause, effect in _filters(engine, best).items()
+             if not effect.of_reference and not effect.restates_core]
     delay = sum(effect.pure_delay_s() for effect in p.axis_model(best.effects).effects
                 if not effect.of_reference) - p.record.lag_s
     std = max((stds.get(cause, {}).get("delay_s", 0.0) for cause in links), default=0.0)
@@ -615,6 +633,7 @@ def _read_off(engine, fitted, found, shown, sensor):
     # what the size of a residual tells presumes that it is noise, or bursts of it
     parts = _structured(engine.budget(fitted))
     is_noise = all(part == "bursts" for _, part in parts) \
+        and engine.left(fitted).share <= _MOSTLY_NOISE \
         and _moving_share(p.record.reference[:, p.axis]) > _LASTS
     for cause, cls in known_effects().items():
         recognised = cls.recognised(seen, shown.get(cause)) if cls.read_off else None
