@@ -134,6 +134,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
+    engine.aside = stray | (record.valid & ~moving)
     _require_relation(engine, axis, seed)
     return judge(engine, engine.run(seed), found, shown, loose, source[1],
                  noise_std)

@@ -8,6 +8,12 @@ from ..errors import ModelError
 from ..parameters import parameter
 from .base import CLIPPING, Effect, Reading
 
+# Share of a limit from which values are near it, how many of them tell, and factor by which what is
+# left there may be larger than elsewhere.
+_NEAR = 0.8
+_TELL = 20
+_LARGER = 3.0
+
 
 @dataclasses.dataclass(frozen=True)
 class Clipping(Effect):
@@ -39,12 +45,27 @@ class Clipping(Effect):
         return (measured <= self.lower) | (measured >= self.upper)
 
     def reading(self, seen):
-        """All samples count: nothing was fitted to those at a limit."""
+        """All samples count: nothing was fitted to those at a limit.
+
+        None where the values bend before they come to a limit: nothing is cut off then.
+        """
+        if self._bends(seen):
+            return None
         resolution = (seen.found.step or 0.0) / np.sqrt(12)
         return Reading({"lower": resolution, "upper": resolution},
                        (seen.measured - seen.output)[seen.rows],
                        (seen.measured - self.simulate(seen.output, None))[seen.rows],
                        "; ".join(words for words in seen.found.words if "limit" in words))
+
+    def _bends(self, seen):
+        free = seen.used & ~self.spoiled(seen.measured)
+        near = free & ((seen.measured <= _NEAR * self.lower)
+                       | (seen.measured >= _NEAR * self.upper))
+        away = free & ~near
+        if near.sum() < _TELL or away.sum() < _TELL:
+            return False
+        error = seen.measured - seen.output
+        return np.std(error[near]) > _LARGER * np.std(error[away])
 
     def simulate(self, values, circumstances):
         return np.clip(values, self.lower, self.upper)

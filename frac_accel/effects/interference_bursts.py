@@ -16,8 +16,12 @@ _BETTER = 50.0
 # does so too: spikes and heavy tails come alone.
 _FEWEST = 5
 _GOES_ON = 0.2
-# Correlation of the bursts, and of the error in them, with the motion, above which they are its.
+# Correlation of the bursts, and of the error in them, with the motion, above which they are its: so
+# much more than chance gives, and at most so much.
 _UNRELATED = 0.15
+_AT_MOST = 0.5
+# Share of the samples in bursts that may repeat the one before them: a sensor that is stuck.
+_REPEATED = 0.5
 _PASSES = 60
 _WINDOW = 5
 
@@ -53,7 +57,8 @@ class InterferenceBursts(Effect):
         inside = _in_bursts(error, noise, loud, share)
         starts = np.flatnonzero(np.diff(np.r_[0, inside.astype(int)]) == 1)
         if len(starts) < _FEWEST or _going_on(error, noise) < _GOES_ON \
-                or _follows(inside, error, output, len(starts)):
+                or _follows(inside, error, output, len(starts)) \
+                or _repeated(seen.measured[seen.used], inside) > _REPEATED:
             return None
         length = inside.sum() / len(starts)
         rms = float(np.sqrt(loud - noise))
@@ -114,11 +119,22 @@ def _follows(inside, error, output, count):
     """Whether the bursts or the error in them have to do with the motion."""
     slope = np.gradient(output)
     bend = np.gradient(slope)
-    allowed = _UNRELATED + 3 / np.sqrt(count)
+    # as many stretches as long as a burst could be one, and as many in them are independent
+    stretches, samples = count / inside.mean(), max(inside.sum() / _WINDOW, count)
     moving = output - output.mean()
     for values in (moving, slope, bend):
-        if abs(np.corrcoef(values**2, inside)[0, 1]) > allowed:
+        if abs(np.corrcoef(values**2, inside)[0, 1]) > _allowed(stretches):
             return True
-        if abs(np.corrcoef(values[inside], error[inside])[0, 1]) > allowed:
+        if abs(np.corrcoef(values[inside], error[inside])[0, 1]) > _allowed(samples):
             return True
     return False
+
+
+def _allowed(count):
+    """Largest correlation of what is unrelated, by as many independent values."""
+    return min(_UNRELATED + 3 / np.sqrt(count), _AT_MOST)
+
+
+def _repeated(measured, inside):
+    """Share of the samples in bursts that repeat the one before."""
+    return np.mean(np.diff(measured, prepend=np.nan)[inside] == 0)
