@@ -8,14 +8,14 @@ from scipy.fft import rfft
 from scipy.ndimage import uniform_filter1d
 
 from ..budget import Division, established_noise
-from ..effects import effect_of
 from ..errors import FracAccelError
-from ..identification.excitation import (
+from ..identification.fit.uncertainty import sandwich
+from ..identification.response.excitation import (
     alternating_stretches,
     learning_length,
     strongest_stretch,
 )
-from ..identification.uncertainty import sandwich
+from ..model.effects import effect_of
 from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case

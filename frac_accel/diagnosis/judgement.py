@@ -9,10 +9,10 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import resample_poly
 
 from ..budget import WORDS
-from ..effects import known_effects
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
-from ..parameters import fixed_values, parameter_fields
+from ..model.effects import known_effects
+from ..model.parameters import fixed_values, parameter_fields
 from ..shown import Shown
 from .empirical import fit_empirical_link
 from .engine import WEIGHS

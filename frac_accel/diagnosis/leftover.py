@@ -7,7 +7,7 @@ from scipy.fft import rfft
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
 
-from ..effects.fit_starts import bulk_shift
+from ..model.effects.fit_starts import bulk_shift
 
 _SEGMENTS = 48
 _SHIFTS = 40

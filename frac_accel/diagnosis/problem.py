@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from ..core.oscillator import tail_rates
-from ..effects.base import CORE, CROSS_AXIS, GAIN, Effect
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, is_link
-from ..parameters import Scales, fixed_values, parameter_fields
+from ..model.core.oscillator import tail_rates
+from ..model.effects.base import CORE, CROSS_AXIS, GAIN, Effect
+from ..model.parameters import Scales, fixed_values, parameter_fields
 from ..simulation import AxisSimulator, kept
 from .time_limit import TimeLimit
 

@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 
-from ..effects import IDENTIFIED, known_effects
 from ..errors import FracAccelError
-from ..parameters import fixed_values
+from ..model.effects import IDENTIFIED, known_effects
+from ..model.parameters import fixed_values
 from .problem import acts_on_spring
 
 _BEAM = 3
