@@ -10,6 +10,7 @@ from ..identification import STRUCTURES, identify
 from ..io.outputs import say
 from ..record import Record
 from ..report.identification import identification_page
+from ..report.quantity import left_open_by
 from ._common import (
     add_json,
     add_report,
@@ -69,8 +70,11 @@ def _print(result, pairs, bags):
     if result.excitation.kind == "multisine" and result.points and result.points.distortion:
         print(result.points.distortion["words"])
     print(f"structure: {result.structure} ({result.reason})")
+    left_open = left_open_by(result.parameters, result.model.core)
     for name, entry in result.parameters.items():
-        print(f"  {name:21} {entry['value']:12.6g} +- {entry['std']:.2g} {entry['unit']}")
+        words = "open: these data do not determine it" if name in left_open \
+            else f"{entry['value']:12.6g} +- {entry['std']:.2g} {entry['unit']}"
+        print(f"  {name:21} {words}")
     print(f"  residual {result.nrmse:.3%} of the output, {result.held_out_nrmse:.3%} on held-out "
           "data")
     if result.validation.records:

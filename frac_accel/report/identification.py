@@ -10,7 +10,7 @@ from ..signals.thinning import close_up, segment
 from ..uncertainty import response_uncertainty
 from . import figures
 from .page import Page
-from .quantity import percent, rounded
+from .quantity import left_open_by, percent, rounded
 from .signals import sentence, thinned
 
 # Frequencies of the drawn response.
@@ -70,8 +70,11 @@ def _held_out(nrmse):
 
 
 def _parameters(section, result):
-    rows = []
+    rows, left_open = [], left_open_by(result.parameters, result.model.core)
     for name, entry in result.parameters.items():
+        if name in left_open:
+            rows.append([name, "open: not determined", "–", "–", "–", entry["unit"]])
+            continue
         value, std = entry["value"], entry["std"]
         shown, uncertainty = rounded(value, std)
         half = figures.COVERAGE_FACTOR * std

@@ -2,6 +2,8 @@
 
 import math
 
+from ..model.parameters import parameter_fields
+
 
 def rounded(value, std):
     """Value and standard uncertainty, both to the second significant digit of the latter.
@@ -51,3 +53,21 @@ def percent(share):
     ('0.021 %', '109 %')
     """
     return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"
+
+
+def left_open_by(parameters, core):
+    """Names of parameters that can only be above zero and are less than their uncertainty.
+
+    Their figures would say nothing.
+
+    Parameters
+    ----------
+    parameters : dict of str to dict
+        ``value`` and ``std`` by name.
+    core : object
+        Core of the model that they belong to.
+    """
+    positive = {field.name for field in parameter_fields(type(core))
+                if field.metadata["above"] == 0}
+    return {name for name, entry in parameters.items()
+            if name in positive and entry["std"] > abs(entry["value"])}

@@ -1,0 +1,88 @@
+"""Drives of an exact sensor with something that no cause in the catalogue says: no false name."""
+
+import numpy as np
+import pytest
+from rig.road import draw_drive, drive_on_road
+from scipy.signal import cheby1, lfilter
+
+import frac_accel
+from frac_accel.model.core import Gain
+
+RATE = 100.0
+NOISE = 0.006  # of the output's standard deviation
+
+
+def drive(seed, duration_s=60.0):
+    rng = np.random.default_rng(seed)
+    motion = drive_on_road(rng, RATE, duration_s, draw_drive(rng)).reference[:, 0]
+    return rng, motion, np.arange(len(motion)) / RATE
+
+
+def diagnosed(rng, motion, output):
+    sensor = output + NOISE * np.std(output) * rng.standard_normal(len(output))
+    return frac_accel.diagnose((motion, sensor), frac_accel.SensorModel(Gain(1.0)),
+                               sampling_rate_hz=RATE)
+
+
+def named(found):
+    return {finding.cause for finding in found.findings}
+
+
+@pytest.mark.parametrize("seed", [3101, 3102])
+def test_an_exact_sensor_is_consistent(seed):
+    rng, motion, _ = drive(seed)
+    found = diagnosed(rng, motion, motion)
+    assert (found.verdict, named(found)) == ("consistent", set())
+
+
+@pytest.mark.parametrize("seed", [3111, 3112])
+def test_a_filter_that_no_cause_says_gets_no_second_name(seed):
+    rng, motion, _ = drive(seed)
+    # the firmware's y += share (x - y), and a steep filter with ripples
+    share = rng.uniform(0.3, 0.6)
+    slow = diagnosed(rng, motion, lfilter([share], [1, share - 1], motion))
+    assert named(slow) <= {"low_pass_lag"}
+    steep = lfilter(*cheby1(4, 2, rng.uniform(15, 25), fs=RATE), motion)
+    assert named(diagnosed(rng, motion, steep)) <= {"low_pass_filter"}
+
+
+@pytest.mark.parametrize("seed", [3121, 3122])
+def test_the_whole_record_counts_for_the_verdict(seed):
+    rng, motion, time = drive(seed)
+    early = time < 0.45 * time[-1]
+    noisy = motion + early * 0.3 * np.std(motion) * rng.standard_normal(len(motion))
+    found = diagnosed(rng, motion, noisy)
+    assert found.verdict not in ("consistent", "explained")
+    assert not named(found)
+
+
+@pytest.mark.parametrize("seed", [3131, 3132])
+def test_a_sensor_that_sticks_has_no_bursts(seed):
+    rng, motion, _ = drive(seed)
+    small = np.convolve(np.abs(motion) < 0.5 * np.std(motion), np.ones(9) / 9, "same") > 0.6
+    sensor = motion + NOISE * np.std(motion) * rng.standard_normal(len(motion))
+    sensor[small] = 0.0
+    found = frac_accel.diagnose((motion, sensor), frac_accel.SensorModel(Gain(1.0)),
+                                sampling_rate_hz=RATE)
+    assert "interference_bursts" not in named(found)
+
+
+@pytest.mark.parametrize("seed", [3141, 3142])
+def test_a_sensor_that_was_dead_for_a_while_is_not_consistent(seed):
+    rng, motion, time = drive(seed)
+    sensor = motion + NOISE * np.std(motion) * rng.standard_normal(len(motion))
+    begin = rng.uniform(0.1, 0.6) * time[-1]
+    sensor[(time > begin) & (time < begin + 0.08 * time[-1])] = 0.0
+    found = frac_accel.diagnose((motion, sensor), frac_accel.SensorModel(Gain(1.0)),
+                                sampling_rate_hz=RATE)
+    assert found.verdict != "consistent"
+    assert "do not count" in found.reason
+
+
+@pytest.mark.parametrize("seed", [3151, 3152])
+def test_a_clock_that_is_set_slowly_has_no_rate(seed):
+    rng, motion, time = drive(seed, 40.0)
+    begin = rng.uniform(0.3, 0.5) * time[-1]
+    late = np.clip((time - begin) * 5e-4, 0.0, 0.008)
+    found = diagnosed(rng, motion, np.interp(time - late, time, motion))
+    assert "clock_skew" not in named(found)
