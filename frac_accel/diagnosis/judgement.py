@@ -29,6 +29,8 @@ _AS_NOISE = 1.2
 _AGAIN = 2
 # Verdicts that leave something to be described.
 _INCOMPLETE = ("unexplained", "partly_explained")
+# Share of the output (RMS) above which what is left says that little of the sensor is understood.
+_MOST_OF = 0.5
 # Samples of a stretch, and share of a record for which it must move, so that the size of what is
 # left can be compared with the motion's: not in a shock.
 _STRETCH = 64
@@ -342,13 +344,8 @@ def _relevant(engine, best, known):
 def _doubts(engine, best, gains, stds, left, noise):
     """Why fitted causes are not named, in words by cause."""
     p = engine.problem
-    core = p.baseline.axis(p.axis).core
     doubts = dict.fromkeys(engine.uncontested, "the time limit left no time for its rivals")
-    for cause in gains:
-        places = [(u, place) for u, place in zip(best.unknowns, best.theta) if u.cause == cause]
-        words = undetermined(best.effects[cause], *zip(*places), stds[cause], core)
-        if words:
-            doubts[cause] = words
+    doubts |= _undetermined(engine, best, stds, gains)
     takes = {cause: float(np.sqrt(max(g.before**2 - g.after**2, 0.0)))
              for cause, g in gains.items()}
     if min(takes.values(), default=np.inf) < WEIGHS * left.rms:
@@ -357,6 +354,10 @@ def _doubts(engine, best, gains, stds, left, noise):
             if rms < WEIGHS * unexplained:
                 doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) does not stand out of "
                                          f"what is left unexplained ({unexplained:.3g} RMS)")
+    if noise.rms is None and left.rms > _MOST_OF * np.std(p.measured[p.used]):
+        for cause in gains:
+            doubts.setdefault(cause, f"{left.rms / np.std(p.measured[p.used]):.0%} of the output "
+                                     "is left, and nothing shows that it is noise")
     for cause, words in (_acausal(engine, best, stds)
                          | _imitators(engine, best, takes, left)).items():
         doubts.setdefault(cause, words)
@@ -371,6 +372,18 @@ def _doubts(engine, best, gains, stds, left, noise):
         for cause, words in engine.unstable(best).items():
             doubts.setdefault(cause, words)
     return {cause: words for cause, words in doubts.items() if cause in gains}
+
+
+def _undetermined(engine, fitted, stds, causes):
+    """Why the record leaves causes open, in words by cause."""
+    p = engine.problem
+    core, found = p.baseline.axis(p.axis).core, {}
+    for cause in causes:
+        places = [(u, place) for u, place in zip(fitted.unknowns, fitted.theta) if u.cause == cause]
+        words = undetermined(fitted.effects[cause], *zip(*places), stds[cause], core, p.time[-1])
+        if words:
+            found[cause] = words
+    return found
 
 
 def _filters(engine, best):
@@ -407,17 +420,24 @@ def _elsewhen(engine, best, takes, left):
 
 
 def _acausal(engine, best, stds):
-    """Links that stand beside a delay below zero: it takes back what they say too much."""
+    """Links beside a lead, which takes back what they say too much."""
     p = engine.problem
-    links = [cause for cause, effect in _filters(engine, best).items()
-             if not effect.of_reference and not effect.restates_core]
-    delay = sum(effect.pure_delay_s() for effect in p.axis_model(best.effects).effects
-                if not effect.of_reference) - p.record.lag_s
-    std = max((stds.get(cause, {}).get("delay_s", 0.0) for cause in links), default=0.0)
-    if len(links) < 2 or delay > -_ACAUSAL * std or delay >= 0:
-        return {}
-    return dict.fromkeys(links, f"together they come to a delay of {delay:.3g} s, which no sensor "
-                                "has: they imitate something else")
+    links = {cause: effect for cause, effect in _filters(engine, best).items()
+             if not effect.restates_core}
+    own = [cause for cause, effect in links.items() if not effect.of_reference]
+    effects = p.axis_model(best.effects).effects
+    delay = sum(effect.pure_delay_s() for effect in effects if not effect.of_reference) \
+        - p.record.lag_s
+    std = max((stds.get(cause, {}).get("delay_s", 0.0) for cause in own), default=0.0)
+    if len(own) >= 2 and delay < 0 and delay <= -_ACAUSAL * std:
+        return dict.fromkeys(own, f"together they come to a delay of {delay:.3g} s, which no "
+                                  "sensor has: they imitate something else")
+    # the reference's delay is a lead of the sensor
+    late = {cause: -effect.pure_delay_s() for cause, effect in links.items()
+            if effect.of_reference and effect.pure_delay_s() < 0}
+    return {cause: f"a lead of {lead:.3g} s beside a filter, less than a sampling interval: a "
+                   "digital filter has one of its own"
+            for cause, lead in late.items() if own and lead < 1 / p.rate}
 
 
 def _accounted(rmse, spread, noise):
@@ -466,11 +486,17 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
     named = {f.cause for f in findings}
     complete = {c for c in best.effects if c not in engine.search.base} <= named
     fitted, stds = best, engine.uncertainties(best)
-    if not complete:
+    while named & best.effects.keys() != fitted.causes - engine.search.base.keys():
         # what is not named is not in the model, and the rest is fitted without it
         fitted = engine.search.fit({c: e for c, e in best.effects.items()
                                     if c in named or c in engine.search.base})
         stds = engine.uncertainties(fitted)
+        for cause, words in _undetermined(engine, fitted, stds,
+                                          fitted.causes - engine.search.base.keys()).items():
+            named.discard(cause)
+            suspects.append(_suspect({cause}, 0.0, words))
+    findings = [f for f in findings if f.cause in named]
+    if not complete:
         findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
                     if f.cause in fitted.effects else f for f in findings]
         fraction = remaining(fitted)

@@ -6,6 +6,8 @@ import numpy as np
 _DETERMINED = 3.0
 # Relative standard uncertainty above which a parameter that is above zero is open.
 _OPEN = 0.5
+# Share of the record above which the uncertainty of an instant leaves it open.
+_ANY_TIME = 0.1
 # Distance from a bound of the search, in its own scale, at which a parameter lies on it.
 _ON_BOUND = 1e-3
 # Two causes that together do less than this share of what the weaker one does alone cancel.
@@ -14,7 +16,7 @@ _CANCEL = 0.5
 _COMPATIBLE = 2.0
 
 
-def undetermined(effect, unknowns, theta, stds, core):
+def undetermined(effect, unknowns, theta, stds, core, duration_s):
     """Why a record leaves a fitted cause open, in words; None where it does not.
 
     Parameters
@@ -27,6 +29,8 @@ def undetermined(effect, unknowns, theta, stds, core):
     stds : dict of str to float
     core : object
         Core of the model in use.
+    duration_s : float
+        Of the record.
     """
     moved = not unknowns
     for unknown, place in zip(unknowns, theta):
@@ -35,6 +39,8 @@ def undetermined(effect, unknowns, theta, stds, core):
             return f"{unknown.name} lies at the end of the range that was searched"
         if unknown.logarithmic and not std < _OPEN * abs(value):
             return f"{unknown.name} is open: {value:.3g} ± {std:.1g}"
+        if unknown.jumps and std > _ANY_TIME * duration_s:
+            return f"{unknown.name} is open: {value:.3g} s ± {std:.1g} s"
         null = null_value(effect, unknown.name, core)
         if null is None or not np.isfinite(null) or abs(value - null) > _DETERMINED * std:
             moved = True

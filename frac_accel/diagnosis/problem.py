@@ -612,7 +612,7 @@ def _step(gram, slope, damping, least, most):
     scale = np.sqrt(np.where(sizes > 0, sizes, 1.0))
     damped = (gram + damping * np.diag(np.diag(gram))) / np.outer(scale, scale)
     sizes, vectors = np.linalg.eigh(damped)
-    root = np.sqrt(np.maximum(sizes, _SINGULAR * sizes[-1]))
+    root = np.sqrt(np.maximum(sizes, max(_SINGULAR * sizes[-1], 1e-300)))
     right = np.where(sizes > _SINGULAR * sizes[-1], vectors.T @ (slope / scale) / root, 0.0)
     return lsq_linear(root[:, None] * vectors.T, right, (least * scale, most * scale),
                       method="bvls").x / scale

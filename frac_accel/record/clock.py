@@ -33,6 +33,10 @@ _FEWEST_PUNCTUAL = 0.6
 # Steps that are short [mean steps], and their share where samples come in batches.
 _SHORT = 0.2
 _BATCHES = 0.3
+# Steps of two ticks that stamps need to be seen as rounded, and the range [ticks] in which rounding
+# moves them.
+_FEWEST_ROUNDED = 10
+_ROUNDED = 1.1
 # Rejections of late stamps from a clock line, and what counts as late [robust deviations].
 _ROUNDS = 8
 _LATE = 3.0
@@ -75,7 +79,7 @@ class Clock:
         least, says when it was taken.
         """
         seconds = (stamps_ns - stamps_ns[0]) * 1e-9
-        found = _batches(seconds)
+        found = _batches(seconds) or _ticked(seconds)
         if found is not None:
             return found
         rate = long_term_rate(stamps_ns)
@@ -228,6 +232,25 @@ def _batches(seconds):
     least = float(np.percentile(late[kept], 5))
     return Clock("batches", float(1 / line[0]), float(line[1]) + least,
                  np.arange(len(seconds), dtype=float), float(np.std(late[kept])))
+
+
+def _ticked(seconds):
+    """Clock of stamps that were rounded to long ticks and none of which is lost; or None.
+
+    Rounding makes some steps two ticks long, evenly; losses do so at random, and add up.
+    """
+    steps = np.diff(seconds)
+    tick = steps.min()
+    ticks = np.round(steps / tick)
+    if np.max(np.abs(steps - ticks * tick)) > _REGULAR * tick or ticks.max() > 2 \
+            or np.sum(ticks == 2) < _FEWEST_ROUNDED:
+        return None
+    count = np.arange(len(seconds), dtype=float)
+    line = np.polyfit(count, seconds, 1)
+    off = seconds - np.polyval(line, count)
+    if np.ptp(off) > _ROUNDED * tick:
+        return None
+    return Clock("regular", float(1 / line[0]), float(line[1]), count, float(np.std(off)))
 
 
 def _delayed(seconds):

@@ -86,3 +86,16 @@ def test_a_clock_that_is_set_slowly_has_no_rate(seed):
     late = np.clip((time - begin) * 5e-4, 0.0, 0.008)
     found = diagnosed(rng, motion, np.interp(time - late, time, motion))
     assert "clock_skew" not in named(found)
+
+
+@pytest.mark.parametrize("seed", [3161, 3162])
+def test_stamps_with_a_long_tick_have_lost_nothing(seed):
+    rng = np.random.default_rng(seed)
+    rate = rng.uniform(93.0, 98.0)
+    motion = drive_on_road(rng, rate, 60.0, draw_drive(rng)).reference
+    exact = np.arange(len(motion)) / rate
+    sensor = motion + NOISE * np.std(motion, axis=0) * rng.standard_normal(motion.shape)
+    stamps = [frac_accel.Samples.of(np.round(1e9 * t).astype(np.int64), values) for t, values in
+              ((exact, motion), (np.floor(100 * exact) / 100, sensor))]
+    found = frac_accel.diagnose(tuple(stamps), frac_accel.SensorModel(Gain(1.0)))
+    assert "dropped_samples" not in named(found)
