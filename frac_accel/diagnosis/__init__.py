@@ -223,6 +223,9 @@ def _require_relation(engine, axis, seed):
 def _require_direction(engine, axis, start):
     """Refuse a pair that the model fits far better the other way round."""
     p = engine.problem
+    own = p.baseline.axis(p.axis)
+    if isinstance(own.core, Gain) and not own.effects:
+        return  # which answers alike either way
     reference, used = p.record.reference[:, p.axis], p.used
     swapped = AxisSimulator(p.measured, p.rate, p.record.temperature_c)
     backward = _shared(reference, swapped.simulate(p.baseline.axis(p.axis)), used)
