@@ -150,7 +150,7 @@ class Engine:
             for cause in best.effects:
                 # nothing takes the place of one that is too weak to be named
                 if cause in self.search.base or \
-                        self._rms(self.added(best, cause)) < WEIGHS * unexplained:
+                        self.rms(self.added(best, cause)) < WEIGHS * unexplained:
                     continue
                 if self.problem.limit.ends_search("not every cause met its rivals"):
                     self.uncontested.add(cause)
@@ -300,7 +300,8 @@ class Engine:
         shares = [left.share, *(share for share, _ in self.structure(fitted))]
         return float(np.sqrt(max(shares))) * left.rms
 
-    def _rms(self, values):
+    def rms(self, values):
+        """RMS of values where samples count."""
         return float(np.sqrt(np.mean(values[self.problem.used]**2)))
 
     def learnt(self, fitted):

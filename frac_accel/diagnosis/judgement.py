@@ -491,8 +491,12 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
         fitted = engine.search.fit({c: e for c, e in best.effects.items()
                                     if c in named or c in engine.search.base})
         stds = engine.uncertainties(fitted)
-        for cause, words in _undetermined(engine, fitted, stds,
-                                          fitted.causes - engine.search.base.keys()).items():
+        remains = engine.left(fitted)
+        takes = {cause: engine.rms(engine.added(fitted, cause))
+                 for cause in fitted.causes - engine.search.base.keys()}
+        for cause, words in {**_imitators(engine, fitted, takes, remains),
+                             **_elsewhen(engine, fitted, takes, remains),
+                             **_undetermined(engine, fitted, stds, takes)}.items():
             named.discard(cause)
             suspects.append(_suspect({cause}, 0.0, words))
     findings = [f for f in findings if f.cause in named]
