@@ -29,6 +29,10 @@ _AS_NOISE = 1.2
 _AGAIN = 2
 # Verdicts that leave something to be described.
 _INCOMPLETE = ("unexplained", "partly_explained")
+# Logarithm of the size from which a link changes an end of the band, and damping ratio of a pole
+# below which it shows as a resonance.
+_UNDONE = 0.3
+_RESONANT = 0.19
 # Share of the output (RMS) above which what is left says that little of the sensor is understood.
 _MOST_OF = 0.5
 # Samples of a stretch, and share of a record for which it must move, so that the size of what is
@@ -359,7 +363,8 @@ def _doubts(engine, best, gains, stds, left, noise):
             doubts.setdefault(cause, f"{left.rms / np.std(p.measured[p.used]):.0%} of the output "
                                      "is left, and nothing shows that it is noise")
     for cause, words in (_acausal(engine, best, stds)
-                         | _imitators(engine, best, takes, left)).items():
+                         | _imitators(engine, best, takes, left)
+                         | _on_both_sides(engine, best)).items():
         doubts.setdefault(cause, words)
     for cause, words in _elsewhen(engine, best, takes, left).items():
         doubts.setdefault(cause, words)
@@ -408,6 +413,30 @@ def _imitators(engine, best, takes, left):
               if cause in takes and (cause in filters or effect.is_constant)]
     return dict.fromkeys(linear, f"a linear filter would take another {share:.0%} of what is left: "
                                  "the linear causes only imitate the true response")
+
+
+def _on_both_sides(engine, best):
+    """Filters of the sensor and of the reference that undo each other at an end of the band."""
+    p = engine.problem
+    ends = 2j * np.pi * np.array([0.01 / p.time[-1], 10 * p.rate])
+    found = {}
+    filters = [(cause, effect, np.log(np.abs(effect.transfer_function(ends))))
+               for cause, effect in _filters(engine, best).items()
+               if is_link(effect) and _is_smooth(effect)]
+    for cause, effect, size in filters:
+        for other, reference, back in filters:
+            if reference.of_reference and not effect.of_reference and np.any(
+                    (size * back < 0) & (np.minimum(np.abs(size), np.abs(back)) > _UNDONE)):
+                words = (f"{cause} and {other} undo each other in part: one filter of the sensor "
+                         "alone, with a zero for the reference's pole, does the same")
+                found |= {cause: words, other: words}
+    return found
+
+
+def _is_smooth(link):
+    """Whether a link has no resonance that would tell it."""
+    poles = np.atleast_1d(link.poles())
+    return not np.any(np.abs(poles.real) < _RESONANT * np.abs(poles))
 
 
 def _elsewhen(engine, best, takes, left):
@@ -494,7 +523,8 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
         remains = engine.left(fitted)
         takes = {cause: engine.rms(engine.added(fitted, cause))
                  for cause in fitted.causes - engine.search.base.keys()}
-        for cause, words in {**_imitators(engine, fitted, takes, remains),
+        for cause, words in {**_on_both_sides(engine, fitted),
+                             **_imitators(engine, fitted, takes, remains),
                              **_elsewhen(engine, fitted, takes, remains),
                              **_undetermined(engine, fitted, stds, takes)}.items():
             named.discard(cause)

@@ -46,6 +46,14 @@ def test_a_filter_that_no_cause_says_gets_no_second_name(seed):
     assert named(diagnosed(rng, motion, steep)) <= {"low_pass_filter"}
 
 
+@pytest.mark.parametrize("seed", [3116, 3117])
+def test_a_shelf_is_no_filter_on_either_side(seed):
+    rng, motion, _ = drive(seed)
+    pole = np.exp(-2 * np.pi * rng.uniform(3, 8) / RATE)
+    shelf = motion + rng.uniform(0.3, 0.6) * lfilter([1 - pole], [1, -pole], motion)
+    assert not named(diagnosed(rng, motion, shelf)) - {"sensitivity_error"}
+
+
 @pytest.mark.parametrize("seed", [3121, 3122])
 def test_the_whole_record_counts_for_the_verdict(seed):
     rng, motion, time = drive(seed)
