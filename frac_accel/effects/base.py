@@ -263,6 +263,10 @@ class Effect:
         """Gain of the link on its plateau."""
         return 1.0
 
+    def unknown_density(self, frequency_hz):
+        """Density [(m/s²)²/Hz] of what a reference's fault leaves unknown of the motion."""
+        return np.zeros_like(frequency_hz)
+
     def poles(self):
         """Poles of the link [rad/s]."""
         return np.array([])
