@@ -79,10 +79,10 @@ def reference_noise(record, column, used, covariance_std=None):
         What the reference's messages state [m/s²].
     """
     rate = record.sampling_rate_hz
-    # on other instants noise is not white any more, and the other topic lacks what is beyond its band
+    # on other instants noise is not white any more, and one topic lacks what is beyond the band
     if record.resampled or used.sum() < 2 * _SEGMENTS:
         return None
-    one, two = record.reference[:, column], record.sensor[:, column]
+    one = record.reference[:, column]
     size = min(_LONGEST, len(one) // (_SEGMENTS // 2))
     frequency, own = welch(one, rate, nperseg=size)
     # the ends: what the window makes of the mean, and half a line

@@ -487,14 +487,14 @@ def _described(engine, fitted, after, parts):
     p, described = engine.problem, {}
     rest, effects, output = engine.held_out_rows, fitted.effects, fitted.output
     for belongs, words, fit in (
-            ({"linear"}, "a fitted filter", lambda: fit_empirical_link(
+            ({"linear"}, "a fitted filter", lambda output: fit_empirical_link(
                 p.measured, output, p.used, rest, p.rate)),
-            ({"even", "odd"}, "a fitted curve", lambda: fit_empirical_map(
+            ({"even", "odd"}, "a fitted curve", lambda output: fit_empirical_map(
                 p.measured, output, p.used, rest))):
         if not belongs & parts or p.limit.ends_judging("no description was fitted to what is left"):
             continue
         try:
-            found = fit()
+            found = fit(output)
             more = {**effects, found.effect.cause: found.effect}
             simulated = p.simulate(more)
         except FracAccelError:

@@ -11,7 +11,7 @@ from ..metrics import interpolate
 from ..model import SensorModel
 from ..parameters import is_varied, parameter_fields
 from ..simulation import simulate
-from .draws import BAND, RATE, Broken, core_for, scale_of, sensor_with, words
+from .draws import BAND, CORE, RATE, Broken, core_for, scale_of, sensor_with, words
 
 # Draws of each check.
 _EXTREMES, _NULLS, _CUTS, _INVERSES = 12, 3, 3, 3
