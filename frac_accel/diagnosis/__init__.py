@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_erosion
 
+from ..budget.reference_noise import reference_noise
 from ..errors import FracAccelError, IdentificationError
 from ..identification.checks.record_checks import moving_samples
 from ..identification.response.excitation import learning_length, require_excitation
@@ -102,8 +103,11 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         return insufficient(f"only {len(record)} samples; {_FEWEST} needed", model, found)
     moving, notes = moving_samples(record, column)
     found.words.extend(notes)
-    shown = _shown(found, record.sensor[:, column])
     used = record.valid & moving
+    noise = reference_noise(record, column, used, _stated_noise(source[0], column))
+    if noise:
+        found = dataclasses.replace(found, reference_noise=noise, words=[*found.words, noise.words])
+    shown = _shown(found, record.sensor[:, column])
     stray = used & spikes(record.sensor[:, column], record.reference[:, column])
     used &= ~stray
     for effect in shown.values():
@@ -126,7 +130,9 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     # the common lag of the stamps is a median of scattered ones
     loose = _left_open(model.axis(axis), stds, 1.25 * found.jitter_rms_s / np.sqrt(found.samples))
     engine = functools.partial(
-        Engine, record, column, model, base={cause: entry.effect for cause, entry in loose.items()},
+        Engine, record.comparable(column, used), column, model, base={
+            **{cause: entry.effect for cause, entry in loose.items()},
+            **{cause: effect for cause, effect in shown.items() if effect.of_reference}},
         candidates=[cause for cause, effect in known_effects().items()
                     if not effect.read_off and effect.acts_on(model.axis(axis).core)],
         log=progress, step=found.step, limit=limit)
@@ -185,6 +191,12 @@ def _classical(record, axis, used, limit):
         core, seed = flat_instead(record, AXES.index(axis), used, core, opened, seed, limit) \
             or (core, seed)
     return core, stds, seed
+
+
+def _stated_noise(samples, column):
+    """Standard deviation [m/s²] that the messages of a topic state, or NaN."""
+    stated = samples.variance[:, column]
+    return np.sqrt(np.nanmean(stated)) if np.isfinite(stated).any() else np.nan
 
 
 def _stated(model, axis):

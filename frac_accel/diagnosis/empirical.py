@@ -27,18 +27,18 @@ class EmpiricalFit:
 
     Attributes
     ----------
-    effect : EmpiricalLink
+    effect : EmpiricalLink or EmpiricalMap
     order : int
-        Of its denominator.
-    band_hz : tuple of float
-        Where the simulated output has power.
+        Of its denominator, or the number of its knots.
+    band_hz : tuple of float or None
+        Where the simulated output has power; None of a map.
     gain : Gain
         On held-out samples, against the simulation as it is.
     """
 
     effect: object
     order: int
-    band_hz: tuple
+    band_hz: tuple | None
     gain: Gain
 
     @property

@@ -9,12 +9,13 @@ from scipy.ndimage import uniform_filter1d
 
 from ..budget import Division, established_noise
 from ..errors import FracAccelError
-from ..identification.fit.uncertainty import sandwich
+from ..identification.fit.uncertainty import by_blocks, sandwich
 from ..identification.response.excitation import (
     alternating_stretches,
     learning_length,
     strongest_stretch,
 )
+from ..model import AxisModel
 from ..model.effects import effect_of
 from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
@@ -48,6 +49,8 @@ _PART = 0.1
 _PART_AT_LEAST = 0.03
 # Share of the residual's power for which a coarse lattice must account.
 _COARSE = 0.2
+# Frequencies over which a density is integrated.
+_LINES = 2049
 
 
 def noise_peak(residual, used):
@@ -223,7 +226,8 @@ class Engine:
                 if entry[0] > _CLOSE or not self.hollow(self.search.fits[entry[1]])]
 
     def uncertainties(self, fitted):
-        """Standard uncertainties by cause and parameter, for any spectrum of the residual."""
+        """Standard uncertainties by cause and parameter, for any spectrum of the residual, and
+        however it goes with the motion."""
         if not fitted.unknowns:
             return {}
         jacobian = dataclasses.replace(fitted, exact=True).jacobian
@@ -235,8 +239,10 @@ class Engine:
         # what does not change the output at all, the record leaves open
         felt = np.linalg.norm(jacobian, axis=0) > 0
         if felt.any():
-            covariance = sandwich(jacobian[np.ix_(used, felt)], fitted.residual[used], used)
-            stds[felt] = np.sqrt(np.maximum(np.diag(covariance), 0))
+            slopes, residual = jacobian[np.ix_(used, felt)], fitted.residual[used]
+            stds[felt] = np.sqrt(np.max([np.diag(sandwich(slopes, residual, used)),
+                                         np.diag(by_blocks(slopes, residual)),
+                                         np.zeros(slopes.shape[1])], axis=0))
         result = {}
         peak = noise_peak(fitted.residual, used)
         for unknown, std in zip(fitted.unknowns, stds):
@@ -258,6 +264,16 @@ class Engine:
         p = self.problem
         return established_noise(fitted.residual, p.measured, p.record.reference, p.used, p.rate,
                                  p.record.sensor_std, stated_std, None, self._division.period)
+
+    def by_reference(self, fitted):
+        """RMS [output units] of what a fit leaves because the reference does not show it."""
+        p = self.problem
+        frequency = np.linspace(0, p.rate / 2, _LINES)[1:]
+        model = p.axis_model(fitted.effects)
+        sensor = AxisModel(model.core, tuple(e for e in model.effects if not e.of_reference))
+        density = sum(e.unknown_density(frequency) for e in model.effects if e.of_reference)
+        gain = np.abs(sensor.transfer_function(2j * np.pi * frequency))
+        return float(np.sqrt(np.mean(gain**2 * density) * p.rate / 2))
 
     def budget(self, fitted):
         """`Budget` of what a fit leaves, of all samples that are there."""

@@ -15,6 +15,7 @@ from ..model.effects import known_effects
 from ..model.parameters import fixed_values, parameter_fields
 from ..shown import Shown
 from .empirical import fit_empirical_link
+from .empirical_map import fit_empirical_map
 from .engine import WEIGHS
 from .evidence import Evidence
 from .experiments import separating_experiment
@@ -542,22 +543,28 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
     by_itself = [f.gain.after for f in findings if f.cause not in fitted.effects]
     # the record is all of it, not only the part that is held out
     error = max(after, _rms(fitted.residual, p.used))
-    accounted = _accounted(min([error, *by_itself]), spread, noise)
-    faulty = accounted and not _accounted(
-        _rms(p.measured - fitted.output, p.used | engine.aside), spread, noise)
+    own = engine.by_reference(fitted)
+
+    def beyond_reference(error):
+        return np.sqrt(max(error**2 - own**2, 0.0))
+    accounted = _accounted(beyond_reference(min([error, *by_itself])), spread, noise)
+    faulty = accounted and not _accounted(beyond_reference(
+        _rms(p.measured - fitted.output, p.used | engine.aside)), spread, noise)
     budget = engine.budget(fitted)
     strange = engine.structure(fitted)
     verdict = _word(findings, suspects, complete, left.share, fraction, accounted,
                     strange or faulty)
     effects = {**fitted.effects, **{f.cause: f.effect for f in findings}}
-    described, after = _described(engine, fitted, after) if verdict in _INCOMPLETE \
-        and any(part == "linear" for _, part in strange) else ({}, after)
-    model = _extended(engine, {**effects, **described})
-    description = ("; the extended model has a fitted filter, which describes a part of it and "
-                   "names nothing") if described else ""
+    described, after = _described(engine, fitted, after, {part for _, part in strange}) \
+        if verdict in _INCOMPLETE else ({}, after)
+    model = _extended(engine, {**effects, **{e.cause: e for e in described}})
+    description = (f"; the extended model has {' and '.join(described.values())}, which describes "
+                   "a part of it and names nothing") if described else ""
     return Diagnosis(
         verdict, _reason(verdict, error / spread, noise, accounted, strange)
-        + _set_aside(engine.aside, p.record.valid) + description,
+        + _set_aside(engine.aside, p.record.valid) + description
+        + (f"; {min(own / error, 1.0)**2:.0%} of that power is what the reference's own noise hides"
+           if own > 0 else ""),
         {"rmse": before, "nrmse": before / spread, "noise_rms": noise_rms},
         findings, suspects,
         {"rmse": after, "nrmse": after / spread},
@@ -568,22 +575,31 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
          for entry in parted.as_list(of)])
 
 
-def _described(engine, fitted, after):
-    """A fitted filter that stands for what no cause explains, by cause, and the held-out error."""
-    p = engine.problem
-    rest = engine.held_out_rows
-    if p.limit.ends_judging("no filter was fitted to what is left"):
-        return {}, after
-    try:
-        found = fit_empirical_link(p.measured, fitted.output, p.used, rest, p.rate)
-        if not found.is_worth_it:
-            return {}, after
-        effects = {**fitted.effects, found.effect.cause: found.effect}
-        output = p.simulate(effects)
-    except FracAccelError:
-        return {}, after
-    error = _rms(p.measured - output, rest)
-    return ({found.effect.cause: found.effect}, error) if error < after else ({}, after)
+def _described(engine, fitted, after, parts):
+    """What stands for what no cause explains, with words, and the held-out error.
+
+    A fitted filter where a part of it is linear, and a fitted curve where one is even or odd.
+    """
+    p, described = engine.problem, {}
+    rest, effects, output = engine.held_out_rows, fitted.effects, fitted.output
+    for belongs, words, fit in (
+            ({"linear"}, "a fitted filter", lambda output: fit_empirical_link(
+                p.measured, output, p.used, rest, p.rate)),
+            ({"even", "odd"}, "a fitted curve", lambda output: fit_empirical_map(
+                p.measured, output, p.used, rest))):
+        if not belongs & parts or p.limit.ends_judging("no description was fitted to what is left"):
+            continue
+        try:
+            found = fit(output)
+            more = {**effects, found.effect.cause: found.effect}
+            simulated = p.simulate(more)
+        except FracAccelError:
+            continue
+        error = _rms(p.measured - simulated, rest)
+        if found.is_worth_it and error < after:
+            effects, output, after = more, simulated, error
+            described[found.effect] = words
+    return described, after
 
 
 def _word(findings, suspects, complete, share, fraction, accounted, strange):
@@ -715,7 +731,8 @@ def _read_off(engine, fitted, found, shown, sensor):
         if recognised is None or (cause not in shown and not is_noise):
             continue
         effect, reading = recognised
-        g = gain(reading.before, reading.after)
+        g = engine.held_out(fitted, cause) if cause in engine.search.base \
+            else gain(reading.before, reading.after)
         if g.ci95[0] > 0 and g.reduction > _RELEVANT:
             findings.append(Finding(effect, reading.std, _certainty(g), [], [
                 reading.evidence, *_evidence(cause, g, np.inf, [])], g))

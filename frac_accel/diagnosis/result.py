@@ -35,8 +35,8 @@ def diagnosis_from(data):
 def _diagnosis(data):
     evidence = data["evidence"] and Evidence.from_dict(data["evidence"])
     model = data["sensor_model"] and SensorModel.from_dict(data["sensor_model"])
-    known = {effect.cause: effect for effect in model.axis(evidence.axis).effects} \
-        if evidence else {}
+    known = {effect.cause: effect for effect in
+             (*model.axis(evidence.axis).effects, *model.reference_faults)} if evidence else {}
     return Diagnosis(
         data["verdict"], data["reason"], _numbers(data["baseline"]),
         [_finding(entry, known) for entry in data["findings"]], data["suspects"],

@@ -11,7 +11,7 @@ from ..model.parameters import is_varied, parameter_fields
 from ..signals.metrics import interpolate
 from ..simulation import simulate
 from ..streaming import Corrector
-from .draws import BAND, CORE, RATE, Broken, scale_of, sensor_with, words
+from .draws import BAND, CORE, RATE, Broken, core_for, scale_of, sensor_with, words
 
 # Draws of each check.
 _EXTREMES, _NULLS, _CUTS, _INVERSES = 12, 3, 3, 3
@@ -57,7 +57,7 @@ def stays_finite(cls, draws):
 
 def _simulated(effect, reference, temperature_c, model=None):
     """Output, or None where the package says in words that there is none."""
-    model = model or (sensor_with(effect) if effect else sensor_with())
+    model = model or sensor_with(effect)
     try:
         return simulate(model, reference, RATE, temperature_c=temperature_c)
     except FracAccelError:
@@ -80,7 +80,7 @@ def vanishes_at_null(cls, draws):
     for _ in range(_NULLS):
         effect, reference = draws.usual(cls), draws.motion(n)
         temperature = draws.circumstances(n).temperature_c
-        without = _simulated(None, reference, temperature)
+        without = _simulated(effect, reference, temperature, SensorModel(core_for(effect)))
         for distance in _DISTANCES:
             near = dataclasses.replace(effect, **{
                 field.name: _near_null(field, distance) for field in fields})
@@ -170,7 +170,7 @@ def inverts_motion(cls, draws):
     feasible, refusal = 0, "no inverse reaches the band of the motion"
     for _ in range(_DESIGNS):
         effect, temperature = draws.usual(cls), draws.circumstances(1).temperature_c[0]
-        model = SensorModel(CORE, [effect])
+        model = SensorModel(core_for(effect), [effect])
         try:
             corrector = Corrector(model, RATE)
         except DesignError as failure:
@@ -188,7 +188,7 @@ def inverts_motion(cls, draws):
             corrector.set_temperature(temperature)
         error, stated = _left(corrector, reference, output)
         if not error < _CORRECTED + _SIGMAS * stated:
-            before, _ = _left(Corrector(SensorModel(CORE), RATE), reference, output)
+            before, _ = _left(Corrector(SensorModel(core_for(effect)), RATE), reference, output)
             if error < _FORCED * before and _overrides(cls, ("add_force",)):
                 feasible += 1
                 continue

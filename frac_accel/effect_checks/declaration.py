@@ -14,7 +14,7 @@ from ..model.effects import effect_names, effect_of
 from ..model.effects.base import REFERENCE, STAMPS, Effect
 from ..model.effects.fit_starts import Start
 from ..model.parameters import Scales, as_mapping, build, is_varied, parameter_fields, plain
-from .draws import CORE, RATE, Broken, sensor_with, span, words
+from .draws import CORE, RATE, Broken, core_for, sensor_with, span, words
 
 _TABLE = Path(__file__).parents[2] / "docs" / "effects.md"
 _KINDS = ("free", "positive", "finite", "weak")
@@ -127,7 +127,7 @@ def survives_yaml(cls, draws):
         effect = draws.any(cls)
         if registered:
             place = "reference_faults" if cls.of_reference else "effects"
-            text = yaml.safe_dump(SensorModel(CORE, **{place: [effect]}).to_dict())
+            text = yaml.safe_dump(SensorModel(core_for(effect), **{place: [effect]}).to_dict())
             again = getattr(SensorModel.from_dict(yaml.safe_load(text)), place)[0]
         else:
             again = build(cls, yaml.safe_load(yaml.safe_dump(plain(as_mapping(effect)))), cls.cause)

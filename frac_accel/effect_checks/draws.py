@@ -4,7 +4,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model import AxisModel, SensorModel
-from ..model.core import Oscillator
+from ..model.core import Gain, Oscillator
 from ..model.effects.base import Circumstances
 from ..model.parameters import Scales, as_mapping, build, is_varied, parameter_fields
 
@@ -124,9 +124,15 @@ def span(field):
             high - inside if limits["below"] == high else high)
 
 
+def core_for(effect):
+    """Core of the test sensor: an oscillator, or a gain for what needs a flat one."""
+    return CORE if effect.acts_on(CORE) else Gain(CORE.sensitivity)
+
+
 def sensor_with(*effects):
     """The test sensor with these effects on its x axis, and none on the others."""
-    return SensorModel(CORE, axes={"x": AxisModel(CORE, effects)})
+    core = next((core_for(effect) for effect in effects if not effect.acts_on(CORE)), CORE)
+    return SensorModel(core, axes={"x": AxisModel(core, effects)})
 
 
 def words(effect):

@@ -14,7 +14,7 @@ from ..errors import ModelError
 from ..io import safe_yaml
 from ..io.outputs import write_text
 from ..io.regular_file import open_regular
-from .core import CORES, Arx
+from .core import CORES, Arx, Oscillator
 from .core.static_force import StaticForce
 from .effects import Circumstances, Effect, effect_names, effect_of
 from .parameters import as_mapping, build, number, parameter_fields, plain
@@ -161,8 +161,9 @@ class SensorModel:
                     raise ModelError(f"effects: {effect.cause} given, which is a fault of the "
                                      "reference, expected under reference_faults")
                 if not effect.acts_on(axis.core):
+                    wanted = "a gain" if isinstance(axis.core, Oscillator) else "an oscillator"
                     raise ModelError(f"effects: {effect.cause} given with a core of type "
-                                     f"{axis.core.type}, expected an oscillator")
+                                     f"{axis.core.type}, expected {wanted}")
             axis.effective_core.require_stable(f"axes.{name}.core" if name in self._own else "core")
 
     @property

@@ -10,6 +10,7 @@ from ..model import AXES
 from .clock import usable
 from .pairing import FEWEST, by_slots, by_stamps, same_clock
 from .relation import clock_offset, refined
+from .resampling import within
 from .temperature import Temperature
 from .topic import Topic
 
@@ -100,6 +101,18 @@ class Record:
             temperature_c=celsius,
             start_ns=self.start_ns + int(rows.start * 1e9 / self.sampling_rate_hz),
             since_start_s=self.since_start_s + rows.start / self.sampling_rate_hz)
+
+    def comparable(self, column, used):
+        """The same with nothing on an axis that one of the two cannot show (`band_hz`).
+
+        `used` (n,) are the samples that count.
+        """
+        if self.band_hz is None or not used.any():
+            return self
+        reference, sensor = self.reference.copy(), self.sensor.copy()
+        for values, good in ((reference, self.valid), (sensor, used)):
+            values[:, column] = within(values[:, column], self.sampling_rate_hz, self.band_hz, good)
+        return dataclasses.replace(self, reference=reference, sensor=sensor)
 
     @functools.cached_property
     def _topics(self):

@@ -15,6 +15,10 @@ _ATTENUATION_DB = 80.0
 _KAISER = 0.1102 * (_ATTENUATION_DB - 8.7)
 # Half-width of the filter [intervals of the rate that is asked for].
 REACH = int(np.ceil((_ATTENUATION_DB - 7.95) / (2.285 * 2 * np.pi * (_GONE - BAND)) / 2))
+# Share of a band that is kept where nothing beyond it may count, and half-width of the filter
+# [periods of the band's edge].
+_INNER = 0.8
+_INNER_TAPS = (_ATTENUATION_DB - 7.95) / (2.285 * 2 * np.pi * (1 - _INNER)) / 2
 # Oversampling at which a spline of degree 5 is wrong by 1e-4 at the band's edge.
 _OVERSAMPLED = 2.2
 _DEGREE = 5
@@ -74,6 +78,28 @@ def band_limited(values, rate_hz, start_s, target_hz, target_start_s, count):
             result[rows, axis] += map_coordinates(fine, [(place - low) * up], order=_DEGREE,
                                                   mode="nearest")
     return result
+
+
+def within(values, rate_hz, band_hz, good):
+    """Uniform samples without what is beyond a band, by a filter of linear phase without delay.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    rate_hz, band_hz : float
+    good : ndarray of bool, shape (n,)
+        Samples that count; a straight line stands for the others.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    place = np.arange(len(values))
+    values = np.interp(place, place[good], values[good])
+    half = min(int(np.ceil(_INNER_TAPS * rate_hz / band_hz)), len(values) - 1)
+    taps = firwin(2 * half + 1, (1 + _INNER) / 2 * band_hz, window=("kaiser", _KAISER), fs=rate_hz)
+    longer = np.pad(values, half, mode="reflect", reflect_type="odd")
+    return oaconvolve(longer, taps, mode="valid")
 
 
 def untouched(present, rate_hz, start_s, target_hz, target_start_s, count):

@@ -34,6 +34,8 @@ class Integrity:
     lower, upper : float or None
         Limits at which samples pile up.
     words : list of str
+    reference_noise : budget.reference_noise.ReferenceNoise or None
+        Of the other topic, where the two together show it.
     """
 
     samples: int
@@ -46,6 +48,7 @@ class Integrity:
     lower: float | None
     upper: float | None
     words: list
+    reference_noise: object = None
 
     @property
     def dropped_fraction(self):

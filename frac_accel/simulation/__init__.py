@@ -269,8 +269,10 @@ class AxisSimulator:
                                  "too large for this record")
         for effect in model.path_dependent:
             passed = motion[0] + deviation
-            deviation = deviation + effect.change_motion(passed) - passed
-        behind = [effect for effect in model.dynamics[1:] if effect.stage > CORE]
+            deviation = deviation + effect.change_motion(passed, 1 / (self._rate * steps)) - passed
+        if self._level:
+            start = deviation[0]
+        behind = [effect for effect in model.dynamics[1:] if effect.stage >= CORE]
         moving = deviation - start
         filtering = [effect for effect in behind if effect.stage < GAIN]
         if filtering:

@@ -5,10 +5,12 @@ import re
 import numpy as np
 import pytest
 import rig
+from exact_sines import oscillator
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
-from frac_accel import diagnose, identify
+from frac_accel import SensorModel, diagnose, identify
+from frac_accel.core import Oscillator
 from frac_accel.errors import FracAccelError
 from frac_accel.io.samples import Samples
 from frac_accel.record import Record
@@ -286,3 +288,28 @@ def test_rates_that_differ_a_little_become_neither_delay_nor_skew():
     for finding in found.findings:
         assert finding.effect.delay_s == pytest.approx(sensor.effects["time_delay"]["delay_s"],
                                                        abs=3e-5)
+
+
+def test_what_the_slower_topic_cannot_show_bends_no_fit():
+    """Motion up to the slower topic's Nyquist frequency, of which the band ends at four fifths."""
+    rng = np.random.default_rng(1)
+    s = 2j * np.pi * np.sort(rng.uniform(1, 49.5, 300))
+    size = rng.uniform(0.03, 0.1, 300) * np.exp(2j * np.pi * rng.random(300))
+
+    def topic(rate, start, count, response):
+        t = start + np.arange(count) / rate
+        values = np.real(np.exp(np.outer(t, s)) @ (size * response))
+        noise = 0.003 * rng.standard_normal(count)
+        return Samples.of(np.round(1e9 * t).astype(np.int64),
+                          np.c_[values + noise, np.zeros((count, 2))])
+
+    def diagnosed(ratio):
+        output = oscillator(s, 35.0, 0.3)
+        return diagnose((topic(370.0, 0.0, 11_100, 1.0), topic(100.0, 0.0031, 2980, output)),
+                        SensorModel(Oscillator(35.0, ratio)))
+    right = diagnosed(0.3)
+    assert (right.verdict, right.findings) == ("consistent", [])
+    assert right.extended["nrmse"] < 0.01
+    moved = diagnosed(0.25)
+    assert [finding.cause for finding in moved.findings] == ["core_parameter_shift"]
+    assert abs(moved.findings[0].effect.damping_ratio / 0.3 - 1) < 0.01

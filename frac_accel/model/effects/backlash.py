@@ -24,7 +24,7 @@ class Backlash(Effect):
 
     gap: float = parameter("output units", minimum=0, scale=(0.1, "level"), null=0.0)
 
-    def change_motion(self, motion):
+    def change_motion(self, motion, step_s):
         from ..core.play import follow
         return follow(np.ascontiguousarray(motion), self.gap)
 

@@ -243,10 +243,11 @@ class Effect:
         """
         return 1.0
 
-    def change_motion(self, motion):
+    def change_motion(self, motion, step_s):
         """What this effect passes on of the core's motion, both shape (n,), finely sampled.
 
-        It begins at rest. Of effects at the stage `CORE` that depend on the path.
+        It begins at rest. Of effects at the stage `CORE` that depend on the path; a link of their
+        own comes after it.
         """
         return motion
 
@@ -261,6 +262,10 @@ class Effect:
     def reference_gain(self):
         """Gain of the link on its plateau."""
         return 1.0
+
+    def unknown_density(self, frequency_hz):
+        """Density [(m/s²)²/Hz] of what a reference's fault leaves unknown of the motion."""
+        return np.zeros_like(frequency_hz)
 
     def poles(self):
         """Poles of the link [rad/s]."""

@@ -1,0 +1,145 @@
+"""How large the recorded reference's own noise is, where the record shows it, and what it leaves.
+
+Least squares on a noisy input is biased: of each frequency's motion, noise adds to the input what
+the output does not have. The best linear estimate of the motion, the reference behind
+
+.. math:: W(f) = 1 - N / S_{rr}(f)
+
+with the density N of white noise, has an error that is not correlated with it, so that a fit to it
+has no bias (regression calibration: R. J. Carroll et al., *Measurement Error in Nonlinear Models*,
+2nd ed. (2006), chapter 4; N. Wiener's filter).
+"""
+
+import dataclasses
+
+import numpy as np
+from scipy.signal import csd, welch
+
+from ..identification.response.recognise import recognise
+from .noise import _given, _periods, _untrusted
+
+_SEGMENTS = 32
+_LONGEST = 1024
+# Power of the noise, of the reference's, below which it bends nothing that the record could tell,
+# and above which nothing is said.
+_LEAST, _MOST = 1e-4, 0.1
+# Quantile of the density that white noise cannot exceed, and by how much an estimate may.
+_FLOOR, _SCATTERS = 0.05, 1.3
+# A floor: coherence with the sensor below which nothing is shared, share of the frequencies that
+# must have none, ratio of the densities there, and how far the sensor must stay below what motion
+# of that density would show.
+_SHARED, _WIDE, _EVEN, _SILENT = 0.2, 0.15, 2.0, 3.0
+# Rest: share of the stretches that may be at rest at least, how much louder than the quietest.
+_STRETCH_S, _STRETCH, _LOUDER, _FEWEST = 0.5, 200, 1.5, 3
+# Of its signal, the sensor's scatter at rest.
+_RESTS = 0.05
+
+
+@dataclasses.dataclass(frozen=True)
+class ReferenceNoise:
+    """White noise of the reference.
+
+    Attributes
+    ----------
+    std : float
+        Standard deviation [m/s²].
+    uncertainty : float
+        Its standard uncertainty [m/s²].
+    by : {"periods", "rest", "covariance", "floor"}
+    frequency_hz, share : tuple of float
+        W at some frequencies.
+    """
+
+    std: float
+    uncertainty: float
+    by: str
+    frequency_hz: tuple
+    share: tuple
+
+    @property
+    def words(self):
+        """Sentence without a full stop."""
+        how = {"periods": "by what differs between its repeated periods",
+               "rest": "where both stand still", "covariance": "as its messages state",
+               "floor": "by what it has, evenly, at frequencies where the sensor has none of it"}
+        return (f"the reference's own noise is {self.std:.3g} m/s^2 RMS, {how[self.by]}: it counts "
+                "behind a filter that leaves as little of it as possible")
+
+
+def reference_noise(record, column, used, covariance_std=None):
+    """`ReferenceNoise` of an axis of a record, or None where it shows none that matters.
+
+    Parameters
+    ----------
+    record : Record
+    column : int
+    used : ndarray of bool, shape (n,)
+        Samples that count.
+    covariance_std : float, optional
+        What the reference's messages state [m/s²].
+    """
+    rate = record.sampling_rate_hz
+    # on other instants noise is not white any more, and one topic lacks what is beyond the band
+    if record.resampled or used.sum() < 2 * _SEGMENTS:
+        return None
+    one = record.reference[:, column]
+    size = min(_LONGEST, len(one) // (_SEGMENTS // 2))
+    frequency, own = welch(one, rate, nperseg=size)
+    # the ends: what the window makes of the mean, and half a line
+    inner = slice(2, -1)
+    power = float(np.var(one))
+    most = np.sqrt(np.quantile(own[inner], _FLOOR) * rate / 2)
+    for std, by in _estimates(record, column, used, covariance_std, most, size):
+        if std is not None and std <= _SCATTERS * most and _LEAST < std**2 / power < _MOST:
+            share = np.clip(1 - 2 * std**2 / rate / own, 0.0, 1.0)
+            share[:2] = share[2] if share[2] else 1.0
+            count = {"covariance": np.inf, "floor": _WIDE * len(one)}.get(by, len(one) / 4)
+            return ReferenceNoise(float(std), float(std / np.sqrt(2 * count)) or 0.05 * float(std),
+                                  by, tuple(frequency.tolist()), tuple(share.tolist()))
+    return None
+
+
+def _estimates(record, column, used, covariance_std, most, size):
+    """Pairs of a standard deviation (or None) and what shows it, the best first."""
+    rate, one, two = record.sampling_rate_hz, record.reference[:, column], record.sensor[:, column]
+    yield _periods(one, used, recognise(one, rate).period_samples), "periods"
+    yield _at_rest(one, two, used, rate), "rest"
+    if _given(covariance_std) and not _untrusted(covariance_std, None, _SCATTERS * most):
+        yield covariance_std, "covariance"
+    yield _floor(one, two, rate, size), "floor"
+
+
+def _at_rest(one, two, used, rate):
+    """Scatter of the reference where neither it nor the sensor moves, and they share nothing."""
+    length = max(_STRETCH, int(np.ceil(_STRETCH_S * rate)))
+    count = len(one) // length
+    if count < 2 * _FEWEST:
+        return None
+    parts = [values[:count * length].reshape(count, length) for values in (one, two)]
+    parts = [part - part.mean(axis=1, keepdims=True) for part in parts]
+    whole = used[:count * length].reshape(count, length).all(axis=1)
+    scatter = [np.where(whole, part.std(axis=1), np.inf) for part in parts]
+    quiet = np.all([s < _LOUDER * s.min() for s in scatter], axis=0)
+    if quiet.sum() < _FEWEST or not scatter[1].min() < _RESTS * two.std():
+        return None
+    shared = np.sum(parts[0][quiet] * parts[1][quiet])**2 / (
+        np.sum(parts[0][quiet]**2) * np.sum(parts[1][quiet]**2))
+    return float(np.sqrt(np.mean(parts[0][quiet]**2))) if shared < _SHARED**2 else None
+
+
+def _floor(one, two, rate, size):
+    """Standard deviation of white noise as large as an even density that the sensor lacks."""
+    frequency, own = welch(one, rate, nperseg=size)
+    other, shared = welch(two, rate, nperseg=size)[1], csd(one, two, rate, nperseg=size)[1]
+    inner = slice(2, -1)
+    own, other, shared = own[inner], other[inner], shared[inner]
+    coherence = np.abs(shared)**2 / np.maximum(own * other, 1e-300)
+    apart, together = coherence < _SHARED, coherence > 0.9
+    if apart.mean() < _WIDE or not together.any():
+        return None
+    low, high = np.quantile(own[apart], (0.1, 0.9))
+    density = np.median(own[apart])
+    gain = np.median(np.abs(shared[together] / own[together]))
+    if high > _EVEN * low or np.median(other[apart]) * _SILENT > gain**2 * density:
+        return None
+    return float(np.sqrt(density * rate / 2))

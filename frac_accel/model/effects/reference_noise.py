@@ -1,0 +1,47 @@
+"""Noise of the recorded reference."""
+
+import dataclasses
+
+import numpy as np
+
+from ..parameters import coefficients, parameter
+from .base import REFERENCE, Effect, Reading
+
+
+@dataclasses.dataclass(frozen=True)
+class ReferenceNoise(Effect):
+    """White noise on the reference.
+
+    Its link is the filter with the least error between the record and the motion
+    (`budget.reference_noise`): `share` of what is recorded at some frequencies, without a delay.
+    """
+
+    cause = "reference_noise"
+    stage = REFERENCE
+    of_reference = True
+    read_off = True
+    explanation = ("The reference has noise of its own, which the sensor does not have: a fit to "
+                   "it as it is finds less gain and other motion than there is.")
+    experiment = ("Put a second reference beside the first: what the two do not share is noise of "
+                  "theirs.")
+
+    std: float = parameter("m/s^2", above=0)
+    frequency_hz: tuple = coefficients()
+    share: tuple = coefficients()
+
+    def transfer_function(self, s):
+        return np.interp(np.abs(s) / (2 * np.pi), self.frequency_hz, self.share) + 0j
+
+    def unknown_density(self, frequency_hz):
+        white = self.std**2 / self.frequency_hz[-1]
+        return white * np.interp(frequency_hz, self.frequency_hz, self.share)
+
+    @classmethod
+    def of_record(cls, found, measured):
+        noise = found.reference_noise
+        return noise and cls(noise.std, noise.frequency_hz, noise.share)
+
+    def reading(self, seen):
+        """What it explains, a fit without it tells: here the error is what that with it leaves."""
+        noise, error = seen.found.reference_noise, (seen.measured - seen.output)[seen.used]
+        return Reading({"std": noise.uncertainty}, error, error, noise.words)
