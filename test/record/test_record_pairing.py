@@ -10,9 +10,9 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from frac_accel import SensorModel, diagnose, identify
-from frac_accel.core import Oscillator
 from frac_accel.errors import FracAccelError
 from frac_accel.io.samples import Samples
+from frac_accel.model.core import Oscillator
 from frac_accel.record import Record
 from frac_accel.validation import validate
 

@@ -9,10 +9,10 @@ from exact_sines import oscillator, record, samples
 
 from frac_accel import SensorModel
 from frac_accel.budget.reference_noise import reference_noise
-from frac_accel.core import Oscillator
 from frac_accel.diagnosis import Diagnosis, diagnose
 from frac_accel.diagnosis.engine import Engine
-from frac_accel.effects import effect_of
+from frac_accel.model.core import Oscillator
+from frac_accel.model.effects import effect_of
 from frac_accel.record import Record
 from frac_accel.validation import validate
 

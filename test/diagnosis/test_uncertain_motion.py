@@ -5,9 +5,9 @@ import pytest
 from exact_sines import oscillator, record, samples
 
 from frac_accel import SensorModel
-from frac_accel.core import Oscillator
 from frac_accel.diagnosis.engine import Engine
-from frac_accel.effects import effect_of
+from frac_accel.model.core import Oscillator
+from frac_accel.model.effects import effect_of
 from frac_accel.record import Record
 
 DRAWS = 30

@@ -6,9 +6,9 @@ from exact_sines import RATE, oscillator, record, samples
 
 from frac_accel import Corrector, check_effect, diagnose
 from frac_accel.diagnosis.empirical_map import fit_empirical_map
-from frac_accel.effects import effect_of
 from frac_accel.errors import FracAccelError, ModelError
 from frac_accel.model import SensorModel
+from frac_accel.model.effects import effect_of
 
 GAIN = {"schema": "frac_accel/sensor_model/1", "core": {"type": "gain"}}
 
