@@ -5,7 +5,7 @@ import functools
 
 import numpy as np
 
-from ..errors import ModelError
+from ...errors import ModelError
 from ..parameters import coefficients
 from .base import DEAD_ZONE, Effect
 
