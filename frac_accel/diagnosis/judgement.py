@@ -320,6 +320,7 @@ def _settled(engine, best, noise_std, known=None):
 
 def _examined(engine, best, noise_std, known):
     best, gains = _relevant(engine, _mirrored(engine, best), known)
+    best = engine.search.to_its_best(best)
     left = engine.left(best)
     noise = engine.established_noise(best, noise_std)
     stds = engine.uncertainties(best)
@@ -442,8 +443,8 @@ def _verdict(engine, best, left, findings, suspects, found, noise, shown_by):
     fitted = best
     if not complete:
         # what is not named is not in the model, and the rest is fitted without it
-        fitted = engine.search.fit({c: e for c, e in best.effects.items()
-                                    if c in named or c in engine.search.base})
+        fitted = engine.search.to_its_best(engine.search.fit(
+            {c: e for c, e in best.effects.items() if c in named or c in engine.search.base}))
         stds = engine.uncertainties(fitted)
         findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
                     if f.cause in fitted.effects else f for f in findings]
