@@ -15,7 +15,7 @@ import dataclasses
 import numpy as np
 from scipy.signal import csd, welch
 
-from ..identification.recognise import recognise
+from ..identification.response.recognise import recognise
 from .noise import _given, _periods, _untrusted
 
 _SEGMENTS = 32

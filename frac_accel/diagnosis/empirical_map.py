@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..effects import effect_of
 from ..errors import FracAccelError
+from ..model.effects import effect_of
 from .empirical import EmpiricalFit
 from .gain import gain
 
