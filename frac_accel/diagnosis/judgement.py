@@ -324,6 +324,7 @@ def _settled(engine, best, noise_std, known=None):
 
 def _examined(engine, best, noise_std, known):
     best, gains = _relevant(engine, _mirrored(engine, best), known)
+    best = engine.search.to_its_best(best)
     left = engine.left(best)
     noise = engine.established_noise(best, noise_std)
     stds = engine.uncertainties(best)
@@ -518,8 +519,8 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
     fitted, stds = best, engine.uncertainties(best)
     while named & best.effects.keys() != fitted.causes - engine.search.base.keys():
         # what is not named is not in the model, and the rest is fitted without it
-        fitted = engine.search.fit({c: e for c, e in best.effects.items()
-                                    if c in named or c in engine.search.base})
+        fitted = engine.search.to_its_best(engine.search.fit(
+            {c: e for c, e in best.effects.items() if c in named or c in engine.search.base}))
         stds = engine.uncertainties(fitted)
         remains = engine.left(fitted)
         takes = {cause: engine.rms(engine.added(fitted, cause))
@@ -541,15 +542,16 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
         p.measured - engine.learnt(fitted).output, rest)
     # what the record shows by itself, such as scattered stamps, is no part of the model
     by_itself = [f.gain.after for f in findings if f.cause not in fitted.effects]
-    # the record is all of it, not only the part that is held out
-    error = max(after, _rms(fitted.residual, p.used))
     own = engine.by_reference(fitted)
 
-    def beyond_reference(error):
-        return np.sqrt(max(error**2 - own**2, 0.0))
-    accounted = _accounted(beyond_reference(min([error, *by_itself])), spread, noise)
-    faulty = accounted and not _accounted(beyond_reference(
-        _rms(p.measured - fitted.output, p.used | engine.aside)), spread, noise)
+    def beyond(rms):
+        """What the reference's own noise does not account for."""
+        return np.sqrt(max(rms**2 - own**2, 0.0))
+    # the record is all of it, not only the part that is held out
+    error = max(after, _rms(fitted.residual, p.used))
+    accounted = _accounted(beyond(min([error, *by_itself])), spread, noise)
+    faulty = accounted and not _accounted(
+        beyond(_rms(p.measured - fitted.output, p.used | engine.aside)), spread, noise)
     budget = engine.budget(fitted)
     strange = engine.structure(fitted)
     verdict = _word(findings, suspects, complete, left.share, fraction, accounted,

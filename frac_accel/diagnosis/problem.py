@@ -371,6 +371,12 @@ class Problem:
         finer.jacobian = fit.jacobian
         return self._improved(finer, _ITERATIONS, hopeless, goal)
 
+    def carried_on(self, fit):
+        """A fit that may have ended early, or near its best only, at its best."""
+        if fit.settled and (fit.exact or not any(map(acts_on_spring, fit.effects.values()))):
+            return fit
+        return self._improved(dataclasses.replace(fit, exact=True), _ITERATIONS, np.inf, np.inf)
+
     def _improved(self, here, iterations, hopeless, goal):
         """A fit with more iterations."""
         damping, here.settled = 0.0, not here.unknowns

@@ -71,6 +71,13 @@ class Search:
             self._keep(self.problem.finished(known) if known else self.problem.fit(effects))
         return self.fits[frozenset(effects)]
 
+    def to_its_best(self, fitted):
+        """A fit that what is reported rests on: trials end as soon as they cannot win."""
+        better = self.problem.carried_on(self.fit(fitted.effects))
+        if better is not self.fits[fitted.causes]:
+            self._keep(better)
+        return better
+
     def _keep(self, fit):
         self.fits.pop(fit.causes, None)
         self.fits[fit.causes] = fit
