@@ -365,10 +365,29 @@ class Engine:
         return worst
 
     def added(self, best, cause):
-        """What a cause adds to the output of a fit, all else as it is, where samples count."""
+        """What a cause adds to the output of a fit, all else as it is, where samples count.
+
+        Without it the motion may have no bound: then all of the output.
+        """
         p = self.problem
         less = {name: effect for name, effect in best.effects.items() if name != cause}
-        return p.clear(best.simulated - p.simulate(less), best.free)
+        try:
+            return p.clear(best.simulated - p.simulate(less), best.free)
+        except FracAccelError:
+            return p.clear(best.simulated, best.free)
+
+    def odd_share(self, best, cause):
+        """Share of the power that a cause adds which turns its sign with the motion."""
+        p = self.problem
+        back = Problem(dataclasses.replace(p.record, reference=-p.record.reference), p.axis,
+                       p.baseline, p.used, p.limit)
+        less = {name: effect for name, effect in best.effects.items() if name != cause}
+        try:
+            here, there = (q.clear(q.simulate(best.effects) - q.simulate(less), best.free)
+                           for q in (p, back))
+        except FracAccelError:
+            return 1.0
+        return float(np.sum((here - there)**2) / max(2 * np.sum(here**2 + there**2), 1e-300))
 
     def unstable(self, best):
         """Causes whose parameters differ between two halves of the record, with words.

@@ -12,6 +12,7 @@ from ..budget import WORDS
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.effects import known_effects
+from ..model.effects.base import CROSS_AXIS
 from ..model.parameters import fixed_values, parameter_fields
 from ..shown import Shown
 from .empirical import fit_empirical_link
@@ -30,6 +31,8 @@ _AS_NOISE = 1.2
 _AGAIN = 2
 # Verdicts that leave something to be described.
 _INCOMPLETE = ("unexplained", "partly_explained")
+# Times the odd (even) part of what is left, in RMS, that an odd (even) cause must take.
+_LIKE_LAW = 10.0
 # Logarithm of the size from which a link changes an end of the band, and damping ratio of a pole
 # below which it shows as a resonance.
 _UNDONE = 0.3
@@ -366,6 +369,7 @@ def _doubts(engine, best, gains, stds, left, noise):
                                      "is left, and nothing shows that it is noise")
     for cause, words in (_acausal(engine, best, stds)
                          | _imitators(engine, best, takes, left)
+                         | _other_laws(engine, best, takes, left)
                          | _on_both_sides(engine, best)).items():
         doubts.setdefault(cause, words)
     for cause, words in _elsewhen(engine, best, takes, left).items():
@@ -415,6 +419,23 @@ def _imitators(engine, best, takes, left):
               if cause in takes and (cause in filters or effect.is_constant)]
     return dict.fromkeys(linear, f"a linear filter would take another {share:.0%} of what is left: "
                                  "the linear causes only imitate the true response")
+
+
+def _other_laws(engine, best, takes, left):
+    """Nonlinear causes beside which what is left is still nonlinear in the same way."""
+    parts = {part: math.sqrt(share) * left.rms for share, part in engine.structure(best)
+             if part in ("odd", "even")}
+    found, filters = {}, _filters(engine, best)
+    for cause, taken in takes.items() if parts else ():
+        effect = best.effects[cause]
+        if cause in filters or effect.shows_with_time or effect.everyday or effect.is_constant \
+                or effect.stage == CROSS_AXIS:
+            continue
+        part = "odd" if engine.odd_share(best, cause) > 0.5 else "even"
+        if taken < _LIKE_LAW * parts.get(part, 0.0):
+            found[cause] = f"what is left is {part} too ({parts[part]:.3g} RMS beside the " \
+                           f"{taken:.3g} that it takes): the law is another one"
+    return found
 
 
 def _on_both_sides(engine, best):
@@ -528,6 +549,7 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
         for cause, words in {**_on_both_sides(engine, fitted),
                              **_imitators(engine, fitted, takes, remains),
                              **_elsewhen(engine, fitted, takes, remains),
+                             **_other_laws(engine, fitted, takes, remains),
                              **_undetermined(engine, fitted, stds, takes)}.items():
             named.discard(cause)
             suspects.append(_suspect({cause}, 0.0, words))

@@ -30,4 +30,4 @@ class LowPassLag(Effect):
 
     @classmethod
     def starts(cls, view):
-        return grid([cls(corner) for corner in view.rate * np.geomspace(0.02, 20, 13)])
+        return grid([cls(corner) for corner in view.rate * np.geomspace(0.002, 20, 17)])
