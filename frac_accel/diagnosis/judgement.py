@@ -748,7 +748,6 @@ def _read_off(engine, fitted, found, shown, sensor):
     # what the size of a residual tells presumes that it is noise, or bursts of it
     parts = engine.structure(fitted)
     is_noise = all(part == "bursts" for _, part in parts) \
-        and engine.left(fitted).share <= _MOSTLY_NOISE \
         and _moving_share(p.record.reference[:, p.axis]) > _LASTS
     for cause, cls in known_effects().items():
         recognised = cls.recognised(seen, shown.get(cause)) if cls.read_off else None

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import INTERFERENCE, Effect, Reading
+from .residual_power import likelihood, variance_law
 
 # Largest share of the time that counts as bursts, and how much louder than the noise they are.
 _MOST = 0.3
@@ -22,6 +23,8 @@ _UNRELATED = 0.15
 _AT_MOST = 0.5
 # Share of the samples in bursts that may repeat the one before them: a sensor that is stuck.
 _REPEATED = 0.5
+# Share of what two noises gain that a noise which grows with the motion may gain.
+_AS_GOOD = 0.5
 _PASSES = 60
 _WINDOW = 5
 
@@ -58,6 +61,7 @@ class InterferenceBursts(Effect):
         starts = np.flatnonzero(np.diff(np.r_[0, inside.astype(int)]) == 1)
         if len(starts) < _FEWEST or _going_on(error, noise) < _GOES_ON \
                 or _follows(inside, error, output, len(starts)) \
+                or _grows(error, output) > _AS_GOOD * better \
                 or _repeated(seen.measured[seen.used], inside) > _REPEATED:
             return None
         length = inside.sum() / len(starts)
@@ -128,6 +132,17 @@ def _follows(inside, error, output, count):
         if abs(np.corrcoef(values[inside], error[inside])[0, 1]) > _allowed(samples):
             return True
     return False
+
+
+def _grows(error, output):
+    """How much better an error that grows with the motion, its slope or its bend is described."""
+    slope = np.gradient(output)
+    constant = likelihood(error, np.full(len(error), np.mean(error**2)))
+    found = []
+    for values in (output - output.mean(), slope, np.gradient(slope)):
+        noise, grown, _ = variance_law(error, values**2)
+        found.append(likelihood(error, noise + grown * values**2) - constant)
+    return max(found)
 
 
 def _allowed(count):

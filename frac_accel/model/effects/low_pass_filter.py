@@ -32,7 +32,7 @@ class LowPassFilter(Effect):
     experiment = ("Excite up to twice the corner frequency: how steeply the amplitude falls there "
                   "tells the filter's order.")
 
-    corner_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-6, 1e3), null=np.inf)
+    corner_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-6, 10.0), null=np.inf)
     order: int = parameter("1", minimum=_LEAST, maximum=_MOST, whole=True)
     family: str = choice(*_FAMILIES)
 

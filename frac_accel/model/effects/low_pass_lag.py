@@ -19,7 +19,7 @@ class LowPassLag(Effect):
     experiment = ("Excite up to several times the corner frequency: a low-pass takes amplitude "
                   "away there, a delay does not.")
 
-    corner_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-6, 1e3), null=np.inf)
+    corner_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-6, 10.0), null=np.inf)
 
     def transfer_function(self, s):
         corner = 2 * np.pi * self.corner_hz
@@ -30,4 +30,4 @@ class LowPassLag(Effect):
 
     @classmethod
     def starts(cls, view):
-        return grid([cls(corner) for corner in view.rate * np.geomspace(0.002, 20, 17)])
+        return grid([cls(corner) for corner in view.rate * np.geomspace(0.002, 9, 16)])

@@ -26,7 +26,7 @@ class ReferenceLowPass(Effect):
                   "high frequencies is the one that was smoothed.")
 
     # further below the Nyquist frequency, little but noise would be left of the fast motion
-    corner_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-3, 1e3), null=np.inf)
+    corner_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-3, 10.0), null=np.inf)
 
     def transfer_function(self, s):
         return 1 + s / (2 * np.pi * self.corner_hz)
