@@ -253,7 +253,7 @@ PACKAGE = Path(frac_accel.__file__).parent
 CLASSES = {effect.__name__: cause for cause, effect in BUILT_IN.items()}
 # Words that mean other things, too: parameters of an identified model, a part of StaticForce; and
 # what no search takes for a cause.
-ORDINARY = {"offset", "hysteresis", "empirical_link"}
+ORDINARY = {"offset", "hysteresis", "empirical_link", "empirical_map"}
 
 
 def named_in(path):
