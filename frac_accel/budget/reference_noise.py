@@ -92,7 +92,8 @@ def reference_noise(record, column, used, covariance_std=None):
     for std, by in _estimates(record, column, used, covariance_std, most, size):
         if std is not None and std <= _SCATTERS * most and _LEAST < std**2 / power < _MOST:
             share = np.clip(1 - 2 * std**2 / rate / own, 0.0, 1.0)
-            share[:2] = share[2] if share[2] else 1.0
+            # a constant is no noise, and the first line holds what the window leaves of it
+            share[:2] = 1.0, share[2]
             count = {"covariance": np.inf, "floor": _WIDE * len(one)}.get(by, len(one) / 4)
             return ReferenceNoise(float(std), float(std / np.sqrt(2 * count)) or 0.05 * float(std),
                                   by, tuple(frequency.tolist()), tuple(share.tolist()))
