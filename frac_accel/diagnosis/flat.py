@@ -6,7 +6,7 @@ from ..model.effects import Effect, known_effects
 from .engine import Engine
 
 # Links that are fitted, and the share of an oscillator's residual power that one may leave.
-_FITTED = 4
+_FITTED = 6
 _FAR_LESS = 0.1
 
 
