@@ -8,10 +8,13 @@ from .engine import Engine
 # Links that are fitted, and the share of an oscillator's residual power that one may leave.
 _FITTED = 6
 _FAR_LESS = 0.1
+# Variances of the noise within which a gain with one link describes a record as well.
+_AS_WELL = 10.0
 
 
 def flat_instead(record, column, used, model, opened, seed, limit=None):
-    """A gain with one link that explains far more than the oscillator that was identified.
+    """A gain with one link that explains far more than the oscillator that was identified, or as
+    much with one parameter less.
 
     A filter of the conditioner has no resonance, but an oscillator bends itself to look like it,
     and every cause that is then found makes up for what it cannot.
@@ -45,7 +48,9 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
     fits = engine.search.fit_all([
         engine.search.begun(start, cause, begin)
         for _, cause, begin in engine.search.screen(start)[:_FITTED]], start.cost)
-    if not fits or fits[0].cost > _FAR_LESS * before.cost:
+    # with one parameter less, as well is better: an oscillator that is damped beyond all is a lag
+    as_well = (1 + _AS_WELL / own.problem.count) * before.cost
+    if not fits or fits[0].cost > max(_FAR_LESS * before.cost, as_well):
         return None
     return flat, {cause: effect for cause, effect in fits[0].effects.items()
                   if cause not in engine.search.base}
