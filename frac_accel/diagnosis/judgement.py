@@ -12,7 +12,7 @@ from ..budget import WORDS
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.effects import known_effects
-from ..model.effects.base import CROSS_AXIS
+from ..model.effects.base import CROSS_AXIS, OFFSET
 from ..model.parameters import fixed_values, parameter_fields
 from ..shown import Shown
 from .empirical import fit_empirical_link
@@ -464,11 +464,17 @@ def _is_smooth(link):
 
 def _elsewhen(engine, best, takes, left):
     """Causes that grow with time beside which what is left still changes with it."""
-    share = sum(share for share, part in engine.structure(best) if part == "time_varying")
-    rest = math.sqrt(share) * left.rms
-    words = f"{share:.0%} of what is left changes with time: the course in time is another one"
-    return {cause: words for cause in takes if best.effects[cause].shows_with_time
-            and not best.effects[cause].everyday and takes[cause] < _RESEMBLES * rest}
+    shares, found = {part: share for share, part in engine.structure(best)}, {}
+    for cause, taken in takes.items():
+        effect = best.effects[cause]
+        # an offset that wanders shows as slow, or as lines of low frequency
+        parts = ("slow", "lines") if effect.stage == OFFSET else ("time_varying",)
+        share = sum(shares.get(part, 0.0) for part in parts)
+        if effect.shows_with_time and not effect.everyday \
+                and taken < _RESEMBLES * math.sqrt(share) * left.rms:
+            found[cause] = f"{share:.0%} of what is left changes with time: the course in time " \
+                           "is another one"
+    return found
 
 
 def _acausal(engine, best, stds):
@@ -731,7 +737,8 @@ def _moved(engine, best, loose, stds):
         error = (engine.problem.measured - best.output)[rows]
         held = engine.problem.simulate({**best.effects, cause: entry.effect})
         g = gain(error + (best.simulated - held)[rows], error)
-        if g.ci95[0] > 0 and g.reduction > _RELEVANT:
+        taken = math.sqrt(max(g.before**2 - g.after**2, 0.0))
+        if g.ci95[0] > 0 and g.reduction > _RELEVANT and taken >= WEIGHS * engine.unexplained(best):
             findings.append(Finding(effect, stds[cause], _confidence(farthest**2), [], [
                 f"{farthest:.3g} standard uncertainties from the model's own value",
                 *_evidence(cause, g, np.inf, [])], g))

@@ -26,7 +26,7 @@ class SecondResonance(Effect):
     experiment = ("Sweep slowly across the second peak: it has a notch beside it. Fix or load "
                   "parts of the fixture one by one: the peak moves with one of them.")
 
-    frequency_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-6, 10.0))
+    frequency_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-6, 0.45))
     damping_ratio: float = parameter("1", above=0, maximum=100, scale=1.0, reach=(1e-4, 1.0))
     # at 1 nothing of the rigid path is left; from a half on it is no second path, and would only
     # imitate a low-pass
