@@ -12,14 +12,12 @@ from ..model.parameters import parameter_fields, plain, rebuilt, unit_of
 from ..shown import Shown
 from .evidence import Evidence
 from .fit.arx import ArxFit
+from .fit.uncertainty import SIGNIFICANT
 from .judge.candidate import needed_order, suspicions
 from .judge.fit_validation import FitValidation, fit_validation, judge_residual
 from .judge.notes import candidate_notes
 from .response.excitation import Excitation
 from .response.points import ResponsePoints
-
-# Standard uncertainties from which on the model has an offset.
-_SIGNIFICANT = 3.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -171,7 +169,7 @@ def identification(chosen, reason, datas, records, axis, provenance, agreeing=No
     validation = fit_validation(tests, own.rmse / data.spread,
                                 chosen.held_out.bands(rate, *excitation.band_hz), agreeing)
     effects = [identified_effect("delay_s", fit["delay_s"])]
-    if abs(fit["offset"]) > _SIGNIFICANT * parameters["offset"]["std"]:
+    if abs(fit["offset"]) > SIGNIFICANT * parameters["offset"]["std"]:
         effects.append(identified_effect("offset", fit["offset"]))
     model = SensorModel(chosen.structure.core(fit), effects, metadata={
         "uncertainties": {name: {"std": entry["std"], "unit": entry["unit"]}

@@ -13,7 +13,7 @@ class LiveSimulator(Stream):
     Parameters
     ----------
     model : SensorModel
-    sample_rate_hz : float
+    sampling_rate_hz : float
         Sampling rate [Hz]; 0: estimated from the first hundred stamps.
 
     Raises
@@ -30,12 +30,12 @@ class LiveSimulator(Stream):
 
     _is_watched = False
 
-    def _design(self, model, sample_rate_hz, **wishes):
-        return design_simulator(model, sample_rate_hz, **wishes)
+    def _design(self, model, sampling_rate_hz, **wishes):
+        return design_simulator(model, sampling_rate_hz, **wishes)
 
     def _begin(self):
         super()._begin()
-        self._effects = self._model.live_simulation(self.sample_rate_hz)
+        self._effects = self._model.live_simulation(self.sampling_rate_hz)
 
     def _after(self, values, variance, index, stamps_ns):
         return self._effects(values, self._circumstances(index, stamps_ns)), variance

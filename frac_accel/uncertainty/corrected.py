@@ -11,6 +11,7 @@ from ..signals.convolution import Convolution
 from ..simulation import static_gain
 from .parameters import LINEAR, UncertainAxis
 
+# Draws of the parameters.
 _DRAWS = 400
 # Room before the record, in samples, for parameters that make the answer come earlier.
 _ROOM = 64

@@ -18,6 +18,7 @@ from .continuous_poles import METHOD, continuous_poles
 from .output_error import Fit
 from .uncertainty import sandwich
 
+# Largest orders that are tried.
 MOST_POLES = 4
 MOST_ZEROS = 7
 # What is asked of the excitation: the poles of one oscillator and as many numerator coefficients.

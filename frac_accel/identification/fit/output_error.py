@@ -46,7 +46,7 @@ _START_LENGTH = 16384
 _TRIAL_ITERATIONS = 5
 # Share of the output's power, times the number of independent frequencies, that the best of all
 # resonances and delays still explains of an unrelated signal.
-_CHANCE = 10
+_UNRELATED = 10
 
 
 @dataclasses.dataclass(frozen=True)
@@ -393,7 +393,7 @@ class _Problem:
 
     def require_relation(self, state):
         explained = self.explained(state)
-        if explained < 0.5 and explained < _CHANCE / self.independent():
+        if explained < 0.5 and explained < _UNRELATED / self.independent():
             raise IdentificationError(
                 "the sensor's output has nothing to do with the reference: the best model explains "
                 f"{max(explained, 0):.2%} of its power, which chance alone can do; were both "
