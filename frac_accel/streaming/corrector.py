@@ -36,6 +36,16 @@ class Corrector(Stream):
     -----
     See `Stream` for how samples flow. A corrected sample's stamp is that of the raw sample that it
     belongs to, less the sensor's own delay.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> raw = frac_accel.read_bag("bags/classical_bench.mcap")["/imu/data_raw"]
+    >>> live = frac_accel.Corrector(frac_accel.SensorModel.load("bags/classical_bench.yaml"))
+    >>> blocks = [live.process(raw.stamps_ns[i:i + 50], raw.values[i:i + 50])
+    ...           for i in range(0, 500, 50)]
+    >>> sum(map(len, blocks)) + live.counters["warm_up"] + live.counters["waiting"]
+    500
     """
 
     def _design(self, model, sampling_rate_hz, **wishes):

@@ -119,6 +119,10 @@ class Stream:
         if sampling_rate_hz:
             self._start(float(sampling_rate_hz))
 
+    def __repr__(self):
+        rate = f"{self.sampling_rate_hz:.6g} Hz" if self.design else "rate not yet known"
+        return f"<{type(self).__name__}: {rate}, {self._model!r}>"
+
     @property
     def model(self):
         """SensorModel in use."""
