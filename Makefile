@@ -55,6 +55,7 @@ test-oldest: $(oldest)/.done
 
 lint: $(venv)/.done
 	$(python) -m ruff check .
+	$(venv)/bin/lint-imports --no-cache --no-logo
 
 types: $(venv)/.done
 	$(python) -m mypy

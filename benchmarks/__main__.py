@@ -9,7 +9,8 @@ import sys
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 FOLDER = pathlib.Path(__file__).parent
-NAMES = ("pydynamic_shock", "simulation_speed", "nonlinear_speed", "identify_peers")
+NAMES = ("pydynamic_shock", "simulation_speed", "nonlinear_speed", "identify_peers",
+         "mcap_writers", "identification_solvers")
 
 
 def print_table(rows):

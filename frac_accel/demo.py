@@ -156,7 +156,7 @@ def _identify(bag, measured, model_file, report):
     pair = Record.of(measured[REFERENCE_TOPIC], measured[RAW_TOPIC], AXIS)
     result = identify(pair, AXIS, provenance=source)
     result.model.save(model_file)
-    identification_page(result, pair, AXIS, source).write(report)
+    identification_page(result, source).write(report)
     truth = bag.with_suffix(".yaml")
     return parameters(result, SensorModel.load(truth) if truth.is_file() else None)
 

@@ -19,14 +19,13 @@ import yaml
 
 from ..errors import FracAccelError
 from ..model import SensorModel
+from ..nodes._bench_stamps import START_NS
 from ..streaming import Corrector
 from . import machine
 from .figures import Figure
 
 _ROOT = Path(__file__).resolve().parents[2]
 _WARM_UP_S = 1.0
-# Stamp of the first sample.
-START_NS = 1_700_000_000 * 10**9
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,7 +18,7 @@ _FAR = 2.0
 # ranks.
 _DIFFER = 2.0
 _FOLLOWS = 1.2
-_CHANCE = 0.1
+_P_VALUE = 0.1
 _STRETCHES = 20
 # Of the stretches at rest, the one whose scatter counts.
 _QUIETEST = 0.25
@@ -230,4 +230,4 @@ def _follows(residual, moving, used):
         return True
     alike = spearmanr(left, level)
     return bool(np.median(left[loud]) > _FOLLOWS * np.median(left[quiet])
-                or (alike.statistic > 0 and alike.pvalue < _CHANCE))
+                or (alike.statistic > 0 and alike.pvalue < _P_VALUE))

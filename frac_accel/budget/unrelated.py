@@ -28,7 +28,7 @@ _RELATED = 0.005
 # noise exceeds its mean by more than ln n in 6 of a million records.
 _TONES = 16
 _FLOOR_BINS = 64
-_CHANCE = 12.0
+_PEAK = 12.0
 # Harmonics of a reference's own tones that its nonlinear answer may have.
 _HARMONICS = 10
 FEW_TONES = 4
@@ -150,7 +150,7 @@ def spectrum_peaks(values):
     floor = np.log(np.median(rows, axis=1) / np.log(2) + 1e-300)
     floor = np.exp(np.interp(np.arange(len(power)), (np.arange(count) + 0.5) * size, floor))
     ratio = power / np.maximum(floor, 1e-300 + 1e-24 * power.max())
-    high = np.flatnonzero((ratio[1:-1] > np.log(n) + _CHANCE) & (power[1:-1] > power[:-2])
+    high = np.flatnonzero((ratio[1:-1] > np.log(n) + _PEAK) & (power[1:-1] > power[:-2])
                           & (power[1:-1] >= power[2:])) + 1
     left, middle, right = (np.log(power[high + k] + 1e-300) for k in (-1, 0, 1))
     bend = left - 2 * middle + right
@@ -182,7 +182,7 @@ def tones(values, reference_ratio, reference_tones, period, used):
         if near < 3 or near > n // 2 - 3:
             continue
         around = reference_ratio[max(near - 2, 0):near + 3]
-        if np.max(around) > np.log(n) + _CHANCE:
+        if np.max(around) > np.log(n) + _PEAK:
             continue
         if period and abs(peak * period / n - round(peak * period / n)) < min(1.5 * period / n, .3):
             continue

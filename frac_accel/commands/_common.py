@@ -88,7 +88,7 @@ def add_filter(parser):
 
 def filter_wishes(arguments):
     """Those wishes as keywords of `Corrector`."""
-    return {"sample_rate_hz": arguments.sample_rate or 0.0, "bandwidth_hz": arguments.bandwidth,
+    return {"sampling_rate_hz": arguments.sample_rate or 0.0, "bandwidth_hz": arguments.bandwidth,
             "lowest_hz": arguments.lowest, "max_delay_s": arguments.max_delay}
 
 

@@ -57,9 +57,11 @@ def run(arguments):
     _print(result, pairs, bags)
     say(f"{arguments.output}: written")
     if arguments.report:
-        identification_page(result, pairs[0], arguments.axis, source).write(arguments.report)
+        page = identification_page(result, source)
+        page.write(arguments.report)
+        source = page.provenance
         say(f"{arguments.report}: written")
-    write_json(arguments.json, result.as_dict())
+    write_json(arguments.json, {**result.as_dict(), "provenance": source})
 
 
 def _print(result, pairs, bags):

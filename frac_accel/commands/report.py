@@ -4,9 +4,11 @@ import json
 
 from ..diagnosis import Diagnosis
 from ..errors import FracAccelError
+from ..identification import Identification
 from ..io.outputs import say
 from ..io.regular_file import read_text
 from ..report.diagnosis import diagnosis_page
+from ..report.identification import identification_page
 from ._common import require_report
 
 _LARGEST = 64 * 2**20
@@ -15,7 +17,8 @@ _LARGEST = 64 * 2**20
 
 def add_arguments(parser):
     """Options of the verb."""
-    parser.add_argument("result", metavar="RESULT.json", help="what diagnose --json has written")
+    parser.add_argument("result", metavar="RESULT.json",
+                        help="what diagnose or identify --json has written")
     parser.add_argument("-o", "--output", required=True, metavar="R.html", help="the page")
 
 
@@ -24,11 +27,21 @@ def run(arguments):
     require_report(arguments.output)
     data = _read(arguments.result)
     try:
-        found = Diagnosis.from_dict(data)
+        page = _page(data)
     except FracAccelError as error:
         raise FracAccelError(f"{arguments.result}: {error}") from None
-    diagnosis_page(found, data.get("provenance")).write(arguments.output)
+    page.write(arguments.output)
     say(f"{arguments.output}: written")
+
+
+def _page(data):
+    if not isinstance(data, dict) or not {"verdict", "structure"} & data.keys():
+        raise FracAccelError("no result of a diagnosis or an identification, expected what "
+                             "frac_accel diagnose or identify --json writes")
+    source = data.get("provenance")
+    if "verdict" in data:
+        return diagnosis_page(Diagnosis.from_dict(data), source)
+    return identification_page(Identification.from_dict(data), source)
 
 
 def _read(path):

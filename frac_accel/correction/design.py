@@ -136,6 +136,15 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
         If it cannot be met; the message says what can.
     ModelError
         If the cross-axis terms cannot be inverted.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> from frac_accel.model.core import Oscillator
+    >>> model = frac_accel.SensorModel(Oscillator(180.0, 0.15))
+    >>> design = frac_accel.design_inverse(model, 1000.0, bandwidth_hz=300.0)
+    >>> [axis.band_hz[1] for axis in design.axes], design.delay_samples < 50
+    ([300.0, 300.0, 300.0], True)
     """
     rate = _positive(sampling_rate_hz, "sampling_rate_hz")
     for name, value in (("bandwidth_hz", bandwidth_hz), ("max_delay_s", max_delay_s),

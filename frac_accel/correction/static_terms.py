@@ -31,6 +31,7 @@ _TOLERANCE = 2e-3
 _BAND_TOLERANCE = 5e-3
 # Parts of N that come with a coefficient each, and the powers of q, which do, too.
 FRICTION, HYSTERESIS = PARTS = "friction", "hysteresis"
+# Powers of the output in a spring's force.
 POWERS = (2, 3)
 # Bouc-Wen variable [output units] beyond which a spike has taken an unbounded branch along.
 _LARGEST_Z = 1e12

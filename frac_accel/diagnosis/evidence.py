@@ -8,14 +8,12 @@ from scipy.signal import welch
 from ..identification.response.excitation import strongest_stretch
 from ..model import AXES, SensorModel
 from ..model.parameters import plain
-from ..signals.thinning import close_up, envelope, segment
+from ..signals.thinning import close_up, legible, segment, thinned
 from .engine import noise_peak
 from .leftover import Leftover
 
 # Points of a signal, and samples of a spectrum's segments (half as many points).
 MOST_POINTS, _SEGMENT = 2000, 4096
-# Significant digits of what is only drawn.
-_DIGITS = 6
 # Sets of causes that are kept.
 _MOST_RIVALS = 14
 # Upper ends of the classes of output, as shares of the samples; the last ones are the peaks.
@@ -199,18 +197,9 @@ def _compared(engine, fitted, named):
 
 
 def _signals(time, outputs, residuals, part=slice(None)):
-    return {kind: {name: tuple(map(_rounded, envelope(time[part], values[part], MOST_POINTS)))
+    return {kind: {name: thinned(time[part], values[part], MOST_POINTS)
                    for name, values in by_name.items()}
             for kind, by_name in (("output", outputs), ("residual", residuals))}
-
-
-def _rounded(values):
-    """Values with so many digits as can be seen."""
-    size = np.where((values == 0) | ~np.isfinite(values), 1.0, np.abs(values))
-    unit = 10.0**(np.floor(np.log10(size)) - _DIGITS + 1)
-    # divided by a power of ten, a whole number is written without a tail of nines
-    return np.where(unit < 1, np.round(values / unit) / np.round(1 / unit),
-                    np.round(values / unit) * unit)
 
 
 def _density(p, residuals):
@@ -218,9 +207,9 @@ def _density(p, residuals):
 
     def density(values):
         frequency, power = welch(np.nan_to_num(values), p.rate, "hann", size)
-        return frequency, _rounded(np.sqrt(power / share))
+        return frequency, legible(np.sqrt(power / share))
     frequency, output = density(np.where(p.used, p.measured, 0.0))
-    return {"frequency_hz": _rounded(frequency), "output": output,
+    return {"frequency_hz": legible(frequency), "output": output,
             "residual": {name: density(values)[1] for name, values in residuals.items()}}
 
 
@@ -243,8 +232,8 @@ def _grouped(place, values, p, residuals):
 
     def mean(of):
         return np.bincount(place, of)[kept] / count[kept]
-    return {"x": _rounded(mean(values)),
-            "rms": {name: _rounded(np.sqrt(mean(residual[p.used]**2)))
+    return {"x": legible(mean(values)),
+            "rms": {name: legible(np.sqrt(mean(residual[p.used]**2)))
                     for name, residual in residuals.items()}}
 
 

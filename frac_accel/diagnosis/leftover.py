@@ -21,7 +21,7 @@ _SHARED = 0.05
 _RELATED = 8.0
 # Share of the power, times the number of independent frequencies, that unrelated signals share at
 # the best of all lags; more than the other is always enough.
-_CHANCE = 12.0
+_BY_CHANCE = 12.0
 _ALWAYS = 0.5
 # Times that rounding is simulated, factor by which its largest share and score may be exceeded, and
 # halvings of the range of the noise before it.
@@ -148,7 +148,7 @@ def related(measured, simulated, used):
     both = np.abs(rfft(values))**2 * np.abs(rfft(expected))**2
     independent = np.sum(both)**2 / max(np.sum(both**2), 1e-300)
     follows = (score > _RELATED and share > _SHARED) \
-        or alike > min(max(_CHANCE / independent, _SHARED), _ALWAYS)
+        or alike > min(max(_BY_CHANCE / independent, _SHARED), _ALWAYS)
     return bool(follows), max(share, alike)
 
 

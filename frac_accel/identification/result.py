@@ -4,20 +4,20 @@ import dataclasses
 
 import numpy as np
 
+from ..errors import FracAccelError, ModelError
 from ..model import SensorModel
 from ..model.core import Oscillator
 from ..model.effects import IDENTIFIED, identified_effect
-from ..model.parameters import parameter_fields, unit_of
+from ..model.parameters import parameter_fields, plain, rebuilt, unit_of
 from ..shown import Shown
+from .evidence import Evidence
 from .fit.arx import ArxFit
+from .fit.uncertainty import SIGNIFICANT
 from .judge.candidate import needed_order, suspicions
 from .judge.fit_validation import FitValidation, fit_validation, judge_residual
 from .judge.notes import candidate_notes
 from .response.excitation import Excitation
 from .response.points import ResponsePoints
-
-# Standard uncertainties from which on the model has an offset.
-_SIGNIFICANT = 3.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Identification(Shown):
         What a user must know before trusting the model.
     validation : FitValidation
         Residual tests, held-out data by octaves, agreement of the records, and the verdict.
-    residual : ndarray, shape (n,)
-        Measured less simulated [output units]; NaN where not judged.
+    evidence : Evidence
+        Signals, residual and spectra, as they are drawn.
     excitation : Excitation
         How the reference has excited the sensor, and how much of the record counts.
     points : ResponsePoints or None
@@ -63,7 +63,7 @@ class Identification(Shown):
     held_out_nrmse: float
     notes: list
     validation: FitValidation
-    residual: np.ndarray
+    evidence: Evidence
     excitation: Excitation
     points: ResponsePoints | None
     frequency_domain: dict | None
@@ -76,8 +76,7 @@ class Identification(Shown):
     def _draw(self, figure):
         band = self.model.band_hz or (1.0, 1000.0)
         frequency = np.geomspace(max(band[0], 1e-3 * band[1]), band[1], 400)
-        axis = self.points.axis if hasattr(self.points, "axis") else "x"
-        response = self.model.frequency_response(frequency, axis)
+        response = self.model.frequency_response(frequency, self.evidence.axis)
         upper, lower = figure.subplots(2, sharex=True)
         upper.loglog(frequency, np.abs(response), label="model")
         lower.semilogx(frequency, np.degrees(np.unwrap(np.angle(response))))
@@ -90,14 +89,45 @@ class Identification(Shown):
         lower.set(xlabel="frequency [Hz]", ylabel="phase [°]")
 
     def as_dict(self):
-        """Plain numbers, lists and the model's content."""
-        return {"model": self.model.to_dict(), "structure": self.structure,
-                "reason": self.reason, "parameters": self.parameters,
-                "nrmse": self.nrmse, "held_out_nrmse": self.held_out_nrmse, "notes": self.notes,
-                "validation": self.validation.as_dict(),
-                "excitation": dataclasses.asdict(self.excitation),
-                "points": None if self.points is None else self.points.as_dict(),
-                "frequency_domain": self.frequency_domain}
+        """Plain numbers, lists and the model's content, as the result file has them."""
+        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return plain({**fields, "model": self.model.to_dict(),
+                      "validation": self.validation.as_dict(),
+                      "evidence": dataclasses.asdict(self.evidence),
+                      "excitation": dataclasses.asdict(self.excitation),
+                      "points": self.points and dataclasses.asdict(self.points)})
+
+    @classmethod
+    def from_dict(cls, data):
+        """Inverse of `as_dict`; null stands for numbers that are none.
+
+        Raises
+        ------
+        FracAccelError
+            If it is no result of an identification.
+        """
+        if not isinstance(data, dict) or not {"structure", "evidence"} <= data.keys():
+            raise FracAccelError("no result of an identification that holds its evidence, expected "
+                                 "what frac_accel identify --json writes")
+        try:
+            compared = data["frequency_domain"]
+            return cls(**{
+                **{field.name: data[field.name] for field in dataclasses.fields(cls)},
+                "model": SensorModel.from_dict(data["model"]),
+                "parameters": _quantities(data["parameters"]),
+                "nrmse": _number(data["nrmse"]),
+                "held_out_nrmse": _number(data["held_out_nrmse"]),
+                "validation": FitValidation.from_dict(data["validation"]),
+                "evidence": Evidence.from_dict(data["evidence"]),
+                "excitation": rebuilt(Excitation, data["excitation"]),
+                "points": data["points"] and ResponsePoints.from_dict(data["points"]),
+                "frequency_domain": compared and {
+                    **compared, "parameters": _quantities(compared["parameters"])}})
+        except ModelError:
+            raise
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise FracAccelError("no complete result of an identification: "
+                                 f"{type(error).__name__}: {error}") from None
 
 
 def identification(chosen, reason, datas, records, axis, provenance, agreeing=None):
@@ -139,7 +169,7 @@ def identification(chosen, reason, datas, records, axis, provenance, agreeing=No
     validation = fit_validation(tests, own.rmse / data.spread,
                                 chosen.held_out.bands(rate, *excitation.band_hz), agreeing)
     effects = [identified_effect("delay_s", fit["delay_s"])]
-    if abs(fit["offset"]) > _SIGNIFICANT * parameters["offset"]["std"]:
+    if abs(fit["offset"]) > SIGNIFICANT * parameters["offset"]["std"]:
         effects.append(identified_effect("offset", fit["offset"]))
     model = SensorModel(chosen.structure.core(fit), effects, metadata={
         "uncertainties": {name: {"std": entry["std"], "unit": entry["unit"]}
@@ -155,8 +185,18 @@ def identification(chosen, reason, datas, records, axis, provenance, agreeing=No
            if isinstance(fit, ArxFit) else {}),
     })
     return Identification(model, chosen.name, reason, parameters, chosen.nrmse,
-                          chosen.held_out_nrmse, notes, validation, fit.residual, excitation,
+                          chosen.held_out_nrmse, notes, validation,
+                          Evidence.of(data, fit.residual), excitation,
                           data.response.points, compared)
+
+
+def _number(value):
+    return np.nan if value is None else float(value)
+
+
+def _quantities(entries):
+    return {name: {**entry, "value": _number(entry["value"]), "std": _number(entry["std"])}
+            for name, entry in entries.items()}
 
 
 def _named(notes, records):

@@ -21,12 +21,23 @@ class Samples(NamedTuple):
         or element 0 is -1) and for message types without a covariance.
     frame_id : str
         Frame of the first sample.
+
+    Examples
+    --------
+    >>> import numpy as np, frac_accel
+    >>> frac_accel.Samples.of(np.arange(1000) * 1_000_000, np.zeros((1000, 3)))
+    <Samples: 1000 in accel_link, 0.999 s>
     """
 
     stamps_ns: np.ndarray
     values: np.ndarray
     variance: np.ndarray
     frame_id: str
+
+    def __repr__(self) -> str:
+        span = f", {(self.stamps_ns[-1] - self.stamps_ns[0]) * 1e-9:.4g} s" \
+            if len(self.stamps_ns) else ""
+        return f"<Samples: {len(self.stamps_ns)} in {self.frame_id}{span}>"
 
     @classmethod
     def of(cls, stamps_ns, values, variance=None, frame_id: str = "accel_link") -> Samples:

@@ -141,6 +141,15 @@ class SensorModel:
     ------
     ModelError
         Naming the field, its value and what was expected.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> model = frac_accel.SensorModel.load("bags/soft_mount.yaml")
+    >>> model
+    <SensorModel: Oscillator, no effects>
+    >>> round(float(abs(model.frequency_response([10.0], "x"))[0]), 2)
+    0.99
     """
 
     def __init__(self, core, effects=(), axes=None, metadata=None, reference_faults=()):
@@ -165,6 +174,13 @@ class SensorModel:
                     raise ModelError(f"effects: {effect.cause} given with a core of type "
                                      f"{axis.core.type}, expected {wanted}")
             axis.effective_core.require_stable(f"axes.{name}.core" if name in self._own else "core")
+
+    def __repr__(self):
+        kinds = dict.fromkeys(
+            f"{type(axis.core).__name__}, "
+            + (", ".join(effect.cause for effect in axis.effects) or "no effects")
+            for axis in self.axes)
+        return f"<SensorModel: {'; '.join(kinds)}>"
 
     @property
     def core(self):

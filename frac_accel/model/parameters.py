@@ -4,6 +4,8 @@ import dataclasses
 import difflib
 import math
 
+import numpy as np
+
 from ..errors import ModelError
 
 
@@ -217,3 +219,26 @@ def plain(value):
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+def rebuilt(cls, data):
+    """Object of a flat dataclass from what `plain` made of its fields; other keys do not count.
+
+    Null stands for numbers that are none.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        Where a field is missing or of another form.
+    """
+    return cls(**{field.name: _as_declared(field.type, data[field.name])
+                  for field in dataclasses.fields(cls)})
+
+
+def _as_declared(kind, value):
+    if kind is float:
+        return math.nan if value is None else float(value)
+    if kind is np.ndarray:
+        array = np.array(value)
+        return array if array.dtype != object else np.array(value, float)
+    return tuple(value) if kind is tuple else value

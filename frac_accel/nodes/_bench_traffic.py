@@ -17,20 +17,15 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu, PointCloud2
 
-from ..bench.live import START_NS
 from ..io import cdr
 from ..io.samples import Samples
+from ._bench_stamps import stamps_ns
 from ._runtime import RawSubscription
 
 DEPTH = 20_000
 QOS = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)
 TOPICS = {"imu": ("imu/data_raw", "imu/data", Imu),
           "blocks": ("accel/blocks_raw", "accel/blocks", PointCloud2)}
-
-
-def stamps_ns(count, rate_hz):
-    """Stamps of `count` samples at a rate."""
-    return START_NS + np.round(np.arange(count) / rate_hz * 1e9).astype(np.int64)
 
 
 def encoded(kind, count, rate_hz, block):

@@ -7,6 +7,7 @@ import numpy as np
 from ..errors import FracAccelError
 from . import resampling
 
+# Common instants of two topics that make a record.
 FEWEST = 32
 # Drift of one topic's instants along the other's over the record that is none [samples], and how
 # many standard uncertainties of it, by the stamps' scatter.

@@ -66,6 +66,12 @@ class Record:
         The usable samples of reference and sensor, with what can be said of each.
     since_start_s : float
         Time [s] from the start of the whole record, of which this may be a part.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> frac_accel.Record.load("bags/classical_bench.mcap")
+    Record(4000 samples at 1000 Hz, 4 s)
     """
 
     sampling_rate_hz: float

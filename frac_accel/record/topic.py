@@ -10,6 +10,7 @@ from .clipping import certain, pile_up
 from .clock import Clock, require_span, usable
 from .lattice import lattice_step
 
+# Samples that make a topic.
 _FEWEST = 32
 # Scatter of the stamps [sampling intervals] below which it counts as none.
 _JITTER = 2e-4

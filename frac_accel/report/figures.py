@@ -277,31 +277,6 @@ def correlation(lags, values, bound, x_label="lag [samples]", y_label="correlati
     return figure
 
 
-def bars(labels, series, y_label, log=False):
-    """Groups of bars, one group per label.
-
-    Parameters
-    ----------
-    labels : sequence of str
-        Such as frequency bands.
-    series : dict of str to sequence of float
-    y_label : str
-    log : bool
-        Logarithmic heights, for what spans decades.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-    """
-    figure = _rows(1, 360, "", [y_label])
-    for (name, values), colour in zip(series.items(), SERIES):
-        figure.add_bar(x=list(labels), y=np.asarray(values, float), name=name,
-                       marker={"color": colour}, showlegend=len(series) > 1)
-    figure.update_xaxes(type="category", showgrid=False)
-    figure.update_yaxes(type="log" if log else "linear")
-    return figure
-
-
 def lines(x, series, x_label, y_label, band=None, points=None, log=""):
     """Lines over a common axis, with an interval and measured points where there are.
 

@@ -1,12 +1,9 @@
 """The page of an identification: what was excited, what was found, and how far to trust it."""
 
 import numpy as np
-from scipy.signal import coherence, welch
 
 from ..errors import ModelError
-from ..identification.response.excitation import strongest_stretch
-from ..model import AXES
-from ..signals.thinning import close_up, segment
+from ..identification.evidence import MOST_POINTS
 from ..uncertainty import response_uncertainty
 from . import figures
 from .page import Page
@@ -19,15 +16,12 @@ _FREQUENCIES = 400
 _STRONG_CORRELATION = 0.9
 
 
-def identification_page(result, pair, axis="x", provenance=None):
+def identification_page(result, provenance=None):
     """Page of an identified model.
 
     Parameters
     ----------
     result : Identification
-    pair : Record
-        What the model was identified from.
-    axis : {"x", "y", "z"}
     provenance : dict, optional
         As for `Page`.
 
@@ -35,14 +29,12 @@ def identification_page(result, pair, axis="x", provenance=None):
     -------
     Page
     """
-    column = AXES.index(axis)
-    reference, sensor = pair.reference[:, column], pair.sensor[:, column]
-    page = Page(f"Identification: {result.structure}, axis {axis}", provenance)
+    page = Page(f"Identification: {result.structure}, axis {result.evidence.axis}", provenance)
     _summary(page.section("Result"), result)
     _parameters(page.section("Parameters"), result)
-    _excitation(page.section("What was excited"), result, reference, sensor, pair)
-    _response(page.section("Frequency response"), result, axis)
-    _residual(page.section("Residual"), result, reference, sensor, pair)
+    _excitation(page.section("What was excited"), result.excitation, result.evidence)
+    _response(page.section("Frequency response"), result)
+    _residual(page.section("Residual"), result.evidence, result.model.noise_std)
     if result.validation.residual:
         _residual_tests(page.section("Residual tests"), result.validation.residual)
     if result.validation.held_out_bands:
@@ -104,11 +96,11 @@ def _parameters(section, result):
         section.text("Correlated: " + "; ".join(strong) + ".")
 
 
-def _excitation(section, result, reference, sensor, pair):
-    excited, rate = result.excitation, pair.sampling_rate_hz
+def _excitation(section, excited, seen):
+    samples, rate = seen.samples, seen.sampling_rate_hz
     low, high = excited.band_hz
     section.text(sentence(excited.description)
-                 + f" {len(pair)} samples at {rate:.6g} Hz ({len(pair) / rate:.4g} s). The "
+                 + f" {samples} samples at {rate:.6g} Hz ({samples / rate:.4g} s). The "
                  "reference has power, and the sensor answers to it, from "
                  f"{low:.4g} Hz to {high:.4g} Hz; elsewhere the model is extrapolated.")
     rows = [["order of persistent excitation", str(excited.order), f"{excited.needed} needed"],
@@ -122,22 +114,20 @@ def _excitation(section, result, reference, sensor, pair):
                 ("standing still", excited.standing)) if count)]
     section.table(["reference, without its mean", "value", ""], rows,
                   "Excitation, and what does not count.")
-    size = segment(len(pair))
-    frequency, power = welch(reference, rate, "hann", size)
+    frequency = seen.density["frequency_hz"]
     section.figure(
-        figures.spectra(frequency, {"reference": np.sqrt(power)}, "m/s²"),
+        figures.spectra(frequency, {"reference": seen.density["reference"]}, "m/s²"),
         "Amplitude spectral density of the reference.")
-    frequency, shared = coherence(reference, sensor, rate, "hann", size)
     above = frequency > 0
     section.figure(
-        figures.lines(frequency[above], {"coherence": shared[above]}, "frequency [Hz]",
-                      "coherence", log="x"),
+        figures.lines(frequency[above], {"coherence": seen.density["coherence"][above]},
+                      "frequency [Hz]", "coherence", log="x"),
         "Coherence of reference and sensor: the share of the sensor's power that a linear sensor "
         "would owe to the reference.")
 
 
-def _response(section, result, axis):
-    model, points = result.model, result.points
+def _response(section, result):
+    model, points, axis = result.model, result.points, result.evidence.axis
     low, high = model.band_hz
     lowest = low or (points.frequency_hz[0] if points else high / 1000)
     frequency = np.geomspace(min(lowest, points.frequency_hz[0]) if points else lowest,
@@ -186,31 +176,21 @@ def _frequency_domain(section, result):
                   "standard uncertainties, the last of the difference as if both were independent.")
 
 
-def _residual(section, result, reference, sensor, pair):
-    rate, residual = pair.sampling_rate_hz, result.residual
-    time_s = np.arange(len(pair)) / rate
-    signals = {"measured": np.where(pair.valid, sensor, np.nan),
-               "model": sensor - residual}
-    section.figure(figures.time_signals(time_s, signals, residual),
-                   "Sensor's output, measured and by the model, and the residual"
-                   + thinned(len(pair)))
-    length = close_up(reference)
-    if len(pair) > 2 * length:
-        part = strongest_stretch(sensor, length)
-        section.figure(
-            figures.time_signals(time_s[part], {name: values[part]
-                                                for name, values in signals.items()},
-                                 residual[part]),
-            f"The {length} samples with the strongest output.")
-    size = segment(len(pair))
-    frequency, output = welch(sensor, rate, "hann", size)
-    judged = np.isfinite(residual)
-    _, left = welch(np.where(judged, residual, 0), rate, "hann", size)
-    noise = result.model.noise_std
+def _residual(section, seen, noise):
+    def drawn(view):
+        signals = dict(seen.signals[view])
+        residual = signals.pop("residual")
+        return figures.time_signals(None, signals, residual)
+    section.figure(drawn("whole"), "Sensor's output, measured and by the model, and the residual"
+                   + thinned(seen.samples, MOST_POINTS))
+    if "close_up" in seen.signals:
+        section.figure(drawn("close_up"),
+                       f"The {seen.close_up_samples} samples with the strongest output.")
+    density = seen.density
     section.figure(
-        figures.spectra(frequency, {"measured output": np.sqrt(output),
-                                    "residual": np.sqrt(left / judged.mean())},
-                        level=noise * np.sqrt(2 / rate)),
+        figures.spectra(density["frequency_hz"], {"measured output": density["output"],
+                                                  "residual": density["residual"]},
+                        level=noise * np.sqrt(2 / seen.sampling_rate_hz)),
         f"Amplitude spectral densities. White noise of the sensor: {noise:.3g} output units "
         "(standard deviation), from the residual above half the Nyquist frequency.")
 

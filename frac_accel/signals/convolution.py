@@ -7,6 +7,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 # of the response, and undoing the damping over half the period costs four of sixteen digits. A
 # shorter period lets what rings ahead of full-band input come back, thirty times larger at 1.5.
 _DAMPING = np.log(1e8)
+# Records in one period of the transform, so that nothing wraps around.
 _PERIOD = 2
 # Share of the frequencies, the highest, over which a response is turned to be real at the last.
 _TURNED = 0.2

@@ -4,6 +4,8 @@ import numpy as np
 
 # Points of a signal after `envelope`: more than a screen has columns, twice.
 MOST_POINTS = 4000
+# Significant digits of what is only drawn.
+_DIGITS = 6
 # Periods of the reference's mean frequency in a close-up.
 _PERIODS = 25
 
@@ -37,6 +39,20 @@ def envelope(x, values, most=MOST_POINTS):
     # a stretch without spread, or without any value, is one point
     chosen = np.unique(np.sort(ends, axis=1) + starts[:, None])
     return np.asarray(x)[chosen], np.asarray(values)[chosen]
+
+
+def legible(values):
+    """Values with so many digits as can be seen."""
+    size = np.where((values == 0) | ~np.isfinite(values), 1.0, np.abs(values))
+    unit = 10.0**(np.floor(np.log10(size)) - _DIGITS + 1)
+    # divided by a power of ten, a whole number is written without a tail of nines
+    return np.where(unit < 1, np.round(values / unit) / np.round(1 / unit),
+                    np.round(values / unit) * unit)
+
+
+def thinned(x, values, most=MOST_POINTS):
+    """`envelope` with so many digits as can be seen."""
+    return tuple(map(legible, envelope(x, values, most)))
 
 
 def close_up(reference):

@@ -26,6 +26,7 @@ from numba import types
 from ..model.core.bouc_wen import follow_one_way
 from ..model.core.static_force import no_force
 
+# Iterations of a step at most, and the change of the force at which they end.
 _PASSES = 40
 _CONVERGED = 1e-7      # of the force
 _SPLITS = 12            # of one step

@@ -16,7 +16,7 @@ class Corrector(Stream):
     Parameters
     ----------
     model : SensorModel
-    sample_rate_hz : float
+    sampling_rate_hz : float
         Sampling rate [Hz]; 0: estimated from the first hundred stamps.
     noise_std : float or sequence of three, optional
         Standard deviation of the raw samples' white noise [output units], used where a sample
@@ -36,10 +36,20 @@ class Corrector(Stream):
     -----
     See `Stream` for how samples flow. A corrected sample's stamp is that of the raw sample that it
     belongs to, less the sensor's own delay.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> raw = frac_accel.read_bag("bags/classical_bench.mcap")["/imu/data_raw"]
+    >>> live = frac_accel.Corrector(frac_accel.SensorModel.load("bags/classical_bench.yaml"))
+    >>> blocks = [live.process(raw.stamps_ns[i:i + 50], raw.values[i:i + 50])
+    ...           for i in range(0, 500, 50)]
+    >>> sum(map(len, blocks)) + live.counters["warm_up"] + live.counters["waiting"]
+    500
     """
 
-    def _design(self, model, sample_rate_hz, **wishes):
-        return design_inverse(model, sample_rate_hz, **wishes)
+    def _design(self, model, sampling_rate_hz, **wishes):
+        return design_inverse(model, sampling_rate_hz, **wishes)
 
     def _adopt(self, model):
         super()._adopt(model)
@@ -59,7 +69,7 @@ class Corrector(Stream):
 
     def _begin(self):
         super()._begin()
-        self._inverse = self._model.live_inverse(self.sample_rate_hz)
+        self._inverse = self._model.live_inverse(self.sampling_rate_hz)
         self._skew = self._model.axes[0].clock_ratio - 1
         self._steps = [(at_s, -step_s) for at_s, step_s in self._model.axes[0].time_steps]
 

@@ -18,7 +18,7 @@ class NoisySensor(LiveSimulator):
 
     Parameters
     ----------
-    model, sample_rate_hz
+    model, sampling_rate_hz
         As for `LiveSimulator`.
     added_noise_std : float
         Standard deviation of the noise [output units].
@@ -26,8 +26,8 @@ class NoisySensor(LiveSimulator):
         Seed of the noise; it does not depend on how the samples are split into blocks.
     """
 
-    def __init__(self, model, sample_rate_hz=0.0, added_noise_std=0.0, seed=0):
-        super().__init__(model, sample_rate_hz)
+    def __init__(self, model, sampling_rate_hz=0.0, added_noise_std=0.0, seed=0):
+        super().__init__(model, sampling_rate_hz)
         self._added_noise_std = added_noise_std
         self._random = np.random.default_rng(seed)
 

@@ -190,14 +190,14 @@ class Findings:
     reference_overlaps: bool | None = None
 
 
-def errors_against(reference, signal, sample_rate_hz, bands):
+def errors_against(reference, signal, sampling_rate_hz, bands):
     """Errors of a signal against a reference that has its own stamps.
 
     Parameters
     ----------
     reference, signal : tuple of ndarray
         Stamps [ns] (n,), ascending, and values (n, 3).
-    sample_rate_hz : float
+    sampling_rate_hz : float
         Rate of the signal.
     bands : sequence of sequence of (float, float)
         Adjoining bands [Hz] for each axis.
@@ -210,10 +210,10 @@ def errors_against(reference, signal, sample_rate_hz, bands):
     """
     reference_rate = estimate_rate(reference[0])
     truth = interpolate(*reference, signal[0], reference_rate)
-    run = _longest_run(signal[0], np.isfinite(truth).all(axis=1), 1e9 / sample_rate_hz)
+    run = _longest_run(signal[0], np.isfinite(truth).all(axis=1), 1e9 / sampling_rate_hz)
     if run.stop - run.start < FEWEST_SAMPLES:
         return None
-    return {axis: error_metrics(truth[run, i], signal[1][run, i], sample_rate_hz, bands[i])
+    return {axis: error_metrics(truth[run, i], signal[1][run, i], sampling_rate_hz, bands[i])
             for i, axis in enumerate(AXES)}
 
 

@@ -13,7 +13,7 @@ class LiveSimulator(Stream):
     Parameters
     ----------
     model : SensorModel
-    sample_rate_hz : float
+    sampling_rate_hz : float
         Sampling rate [Hz]; 0: estimated from the first hundred stamps.
 
     Raises
@@ -26,16 +26,25 @@ class LiveSimulator(Stream):
     See `Stream` for how samples flow. Each keeps the stamp of the reference sample that it belongs
     to, so the sensor's own delay is in the values, as in `simulate`; only a clock that is skewed or
     jumps changes stamps. A nonlinear spring and friction are simulated offline alone.
+
+    Examples
+    --------
+    >>> import numpy as np, frac_accel
+    >>> model = frac_accel.SensorModel.load("bags/classical_bench.yaml")
+    >>> live = frac_accel.LiveSimulator(model, 1000.0)
+    >>> still = live.process(np.arange(2000) * 1_000_000, np.tile([0.0, 0.0, 9.81], (2000, 1)))
+    >>> bool(abs(still.values[-1, 2] / 9.81 - model.axes[2].core.sensitivity) < 1e-3)
+    True
     """
 
     _is_watched = False
 
-    def _design(self, model, sample_rate_hz, **wishes):
-        return design_simulator(model, sample_rate_hz, **wishes)
+    def _design(self, model, sampling_rate_hz, **wishes):
+        return design_simulator(model, sampling_rate_hz, **wishes)
 
     def _begin(self):
         super()._begin()
-        self._effects = self._model.live_simulation(self.sample_rate_hz)
+        self._effects = self._model.live_simulation(self.sampling_rate_hz)
 
     def _after(self, values, variance, index, stamps_ns):
         return self._effects(values, self._circumstances(index, stamps_ns)), variance

@@ -19,6 +19,10 @@ good samples again.
 
 import numpy as np
 
+# Length of a frame [s] and its fewest samples; times [s] at rest until an axis is stuck; smallest
+# steps that the others move meanwhile, and that tell held samples; share of repetitions in a frame
+# of these, and how many frames they take; frames until a verdict is withdrawn; shares of the noise
+# and of the others' motion that are stillness.
 FRAME_S, FEWEST = 0.1, 10
 STUCK_S, COARSE_S, LONG_S = 0.3, 5.0, 60.0
 MOVES, JUMPS = 8.0, 4.0

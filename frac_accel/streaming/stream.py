@@ -63,7 +63,7 @@ class Stream:
     Parameters
     ----------
     model : SensorModel
-    sample_rate_hz : float
+    sampling_rate_hz : float
         Sampling rate [Hz]; 0: estimated from the first hundred stamps.
     noise_std : float or sequence of three, optional
         Standard deviation of the white noise of the input, used where a sample comes without a
@@ -92,11 +92,13 @@ class Stream:
     # Whether the axes are watched; what drives a simulation may stand still.
     _is_watched = True
 
-    def __init__(self, model, sample_rate_hz=0.0, noise_std=None, plausible_range=None,
+    def __init__(self, model, sampling_rate_hz=0.0, noise_std=None, plausible_range=None,
                  on_fault="covariance", largest_rate=0.0, **wishes):
-        if not np.isfinite(sample_rate_hz) or sample_rate_hz < 0:
-            raise FracAccelError(f"sample_rate_hz: {sample_rate_hz} given, expected a number above "
-                                 "0, or 0 to estimate it from the stamps")
+        # as it was called first
+        sampling_rate_hz = wishes.pop("sample_rate_hz", sampling_rate_hz)
+        if not np.isfinite(sampling_rate_hz) or sampling_rate_hz < 0:
+            raise FracAccelError(f"sampling_rate_hz: {sampling_rate_hz} given, expected a number "
+                                 "above 0, or 0 to estimate it from the stamps")
         self._wishes = wishes
         self._adopt(model)
         self._noise_std = noise_std
@@ -114,8 +116,12 @@ class Stream:
         self._clock = None
         self._prepared = None
         self.design = None
-        if sample_rate_hz:
-            self._start(float(sample_rate_hz))
+        if sampling_rate_hz:
+            self._start(float(sampling_rate_hz))
+
+    def __repr__(self):
+        rate = f"{self.sampling_rate_hz:.6g} Hz" if self.design else "rate not yet known"
+        return f"<{type(self).__name__}: {rate}, {self._model!r}>"
 
     @property
     def model(self):
@@ -123,9 +129,11 @@ class Stream:
         return self._model
 
     @property
-    def sample_rate_hz(self):
+    def sampling_rate_hz(self):
         """Sampling rate [Hz]; None while it is being estimated."""
         return self.design.sampling_rate_hz if self.design else None
+
+    sample_rate_hz = sampling_rate_hz
 
     @property
     def faults(self):
@@ -222,7 +230,7 @@ class Stream:
             if not self._estimate(2):
                 raise FracAccelError(
                     f"the sampling rate cannot be estimated from {self._samples} sample(s) whose "
-                    "stamps do not advance or are too far apart; give it as sample_rate_hz")
+                    "stamps do not advance or are too far apart; give it as sampling_rate_hz")
             ready = self._filter_held()
             return _concatenated([ready, self._filter_decided(*self._nothing_more())])
         return self._filter_decided(*self._nothing_more())
@@ -246,8 +254,8 @@ class Stream:
             If they cannot be met.
         """
         wishes = {**self._wishes, **wishes}
-        if self.sample_rate_hz:
-            design = design or self._designed(model, self.sample_rate_hz, wishes)
+        if self.sampling_rate_hz:
+            design = design or self._designed(model, self.sampling_rate_hz, wishes)
             self._prepared = model, wishes, design
 
     def replace(self, model, **wishes):
@@ -278,7 +286,7 @@ class Stream:
         if prepared and prepared[0] is model and prepared[1] == wishes:
             design = prepared[2]
         else:
-            design = self._designed(model, self.sample_rate_hz, wishes)
+            design = self._designed(model, self.sampling_rate_hz, wishes)
         self._adopt(model)
         self._wishes = wishes
         self._use(design)
@@ -289,14 +297,14 @@ class Stream:
         """Take a model as the one in use."""
         self._model = model
 
-    def _design(self, model, sample_rate_hz, **wishes):
+    def _design(self, model, sampling_rate_hz, **wishes):
         """FilterDesign for a model at a sampling rate."""
         raise NotImplementedError
 
-    def _designed(self, model, sample_rate_hz, wishes):
+    def _designed(self, model, sampling_rate_hz, wishes):
         """The same; whatever goes wrong is a DesignError."""
         try:
-            return self._design(model, sample_rate_hz, **wishes)
+            return self._design(model, sampling_rate_hz, **wishes)
         except FracAccelError:
             raise
         except Exception as error:  # a model can be beyond what the linear algebra can bear

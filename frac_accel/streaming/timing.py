@@ -24,6 +24,8 @@ from ..signals.linear_filter import run_filter
 from ..signals.sample_rate import interval_of
 from .bridging import BridgeErrors
 
+# Stamps that tell the rate; intervals by which a stamp is off the clock, or a sample is missing;
+# stamps in a row until a clock has been set back; largest value that a sample may have.
 RATE_SAMPLES = 100
 JITTER = 0.1
 MISSING = 0.75

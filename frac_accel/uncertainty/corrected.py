@@ -11,6 +11,7 @@ from ..signals.convolution import Convolution
 from ..simulation import static_gain
 from .parameters import LINEAR, UncertainAxis
 
+# Draws of the parameters.
 _DRAWS = 400
 # Room before the record, in samples, for parameters that make the answer come earlier.
 _ROOM = 64
@@ -72,6 +73,15 @@ def corrected_uncertainty(model, corrected, sampling_rate_hz):
         If the model has no covariance, or not a valid one.
     FracAccelError
         If the samples are not finite or of the wrong shape.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> model = frac_accel.identify("bags/classical_bench.mcap").model
+    >>> corrected = frac_accel.correct("bags/classical_bench.mcap", model)
+    >>> added = frac_accel.corrected_uncertainty(model, corrected.values, 1000.0)
+    >>> added.variance.shape == corrected.values.shape
+    True
     """
     corrected = np.asarray(corrected, float)
     if corrected.ndim != 2 or corrected.shape[1] != 3 or len(corrected) < 2:

@@ -84,6 +84,14 @@ def response_uncertainty(model, frequency_hz, axis="x"):
     ------
     ModelError
         If the model has no covariance, or not a valid one.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> model = frac_accel.identify("bags/classical_bench.mcap").model
+    >>> known = frac_accel.response_uncertainty(model, [50.0, 180.0])
+    >>> [bool(value) for value in known.amplitude_std < 1e-3 * known.amplitude]
+    [True, True]
     """
     uncertain = UncertainAxis.of(model, axis)
     frequency_hz = np.atleast_1d(np.asarray(frequency_hz, float))

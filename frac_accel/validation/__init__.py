@@ -107,7 +107,7 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     sampling_rate_hz : float, optional
         Of arrays [Hz].
     **wishes
-        ``sample_rate_hz``, ``bandwidth_hz``, ``max_delay_s``, ``lowest_hz`` as for `Corrector`.
+        ``sampling_rate_hz``, ``bandwidth_hz``, ``max_delay_s``, ``lowest_hz`` as for `Corrector`.
 
     Returns
     -------

@@ -50,7 +50,7 @@ def test_a_correction_with_it_gives_back_the_motion():
     model = SensorModel.from_dict(content)
     assert model.to_dict()["effects"] == content["effects"]
     reference, sensor = record(np.random.default_rng(8), two_modes, band=(5, 250), noise=0)
-    corrector = Corrector(model, sample_rate_hz=RATE)
+    corrector = Corrector(model, sampling_rate_hz=RATE)
     raw = samples(reference, sensor)[1]
     parts = corrector.process(*raw[:3]), corrector.finish()
     stamps, values = (np.concatenate([getattr(part, name) for part in parts])

@@ -94,9 +94,9 @@ def test_simulated_as_exactly(cause, seed):
 def test_correction_gives_back_the_reference(cause, seed):
     core, parameters, _ = drawn(cause, seed)
     whole = model(core, [{"cause": cause, **parameters}])
-    top = Corrector(whole, sample_rate_hz=RATE).design.axes[0].band_hz[1]
+    top = Corrector(whole, sampling_rate_hz=RATE).design.axes[0].band_hz[1]
     _, _, (reference, sensor) = drawn(cause, seed, noise=0, band=(1.0, 0.9 * top))
-    corrector = Corrector(whole, sample_rate_hz=RATE)
+    corrector = Corrector(whole, sampling_rate_hz=RATE)
     raw = samples(reference, sensor)[1]
     parts = corrector.process(*raw[:3]), corrector.finish()
     stamps, values = (np.concatenate([getattr(part, name) for part in parts])
@@ -112,14 +112,14 @@ def test_correction_gives_back_the_reference(cause, seed):
 def test_a_linear_phase_filters_delay_leaves_the_stamps():
     corrector = Corrector(model(GAIN, [{"cause": "linear_phase_filter", "length_s": 2.01e-3,
                                         "order": 1}, {"cause": "time_delay", "delay_s": 506e-6}]),
-                          sample_rate_hz=RATE)
+                          sampling_rate_hz=RATE)
     assert corrector.design.sensor_delay_ns == pytest.approx(1_511_000, abs=1)
 
 
 @pytest.mark.parametrize("length_s", [2.01e-3, 20e-3])
 def test_a_band_ends_below_the_first_notch(length_s):
     corrector = Corrector(model(GAIN, [{"cause": "linear_phase_filter", "length_s": length_s,
-                                        "order": 2}]), sample_rate_hz=RATE)
+                                        "order": 2}]), sampling_rate_hz=RATE)
     assert 0.3 / length_s < corrector.design.axes[0].band_hz[1] < 1 / length_s
 
 

@@ -53,7 +53,7 @@ def test_no_part_of_the_correction(cause):
     core, value, _, (_, sensor) = drawn(cause, 0)
     raw = samples(sensor, sensor)[1]
     fault = {"cause": cause, FAULTS[cause][0]: value}
-    one, other = (Corrector(model(core, **keys), sample_rate_hz=RATE).process(*raw[:3])
+    one, other = (Corrector(model(core, **keys), sampling_rate_hz=RATE).process(*raw[:3])
                   for keys in ({}, {"reference_faults": [fault]}))
     assert np.array_equal(one.values, other.values, equal_nan=True)
     assert np.array_equal(one.stamps_ns, other.stamps_ns)

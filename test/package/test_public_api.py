@@ -18,7 +18,9 @@ BAGS = Path(__file__).parents[2] / "bags"
 RATE = 1000.0
 MODEL = SensorModel(Oscillator(90.0, 0.2, sensitivity=2.0))
 PUBLIC = ("simulation", "streaming.offline", "validation", "identification", "diagnosis",
-          "effect_checks", "report.page")
+          "effect_checks", "report.page", "signals.metrics", "correction.design",
+          "uncertainty.response", "uncertainty.corrected", "streaming.corrector",
+          "streaming.live_simulation", "model.file", "io.samples", "record.record", "io.bag")
 
 
 @pytest.fixture(scope="module")

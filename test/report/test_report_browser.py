@@ -74,13 +74,12 @@ def test_every_kind_of_figure_is_drawn(tmp_path):
         figures.time_signals(time_s, {"a": signal, "b": -signal}, 0.1 * signal)).figure(
         figures.spectra(frequency, {"a": frequency**-0.5}, level=0.05)).figure(
         figures.correlation(np.arange(50), rng.standard_normal(50) / 10, 0.2)).figure(
-        figures.bars(["low", "high"], {"before": [1, 2], "after": [0.1, 0.2]}, "NRMSE [%]")).figure(
         figures.lines(frequency, {"a": frequency}, "x", "y", (0.9 * frequency, 1.1 * frequency),
                       (frequency[::20], frequency[::20], np.ones(10)), log="xy"))
     page.write(tmp_path / "page.html")
     dom, console = browser.open_page(tmp_path / "page.html")
     assert not console
-    assert len(require_drawn(dom)) == 8
+    assert len(require_drawn(dom)) == 7
     # no button that would send the data anywhere
     assert set(re.findall(r'data-title="([^"]*)"', dom)) <= BUTTONS
 

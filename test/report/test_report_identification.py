@@ -10,7 +10,9 @@ import pytest
 
 from frac_accel import SensorModel, identify
 from frac_accel.cli import main
+from frac_accel.commands._common import write_json
 from frac_accel.errors import ModelError
+from frac_accel.identification import Identification
 from frac_accel.record import Record
 from frac_accel.report.identification import identification_page
 from frac_accel.report.quantity import percent, rounded
@@ -37,6 +39,10 @@ def test_page_tells_what_was_found(tmp_path, structure):
     files = {name: str(tmp_path / name) for name in ("m.yaml", "r.html", "r.json")}
     assert main(["identify", str(BAG), "--axis", "y", "--structure", structure, "-o",
                  files["m.yaml"], "--report", files["r.html"], "--json", files["r.json"]]) == 0
+    # the page again from the result file, without the bag
+    assert main(["report", files["r.json"], "-o", str(tmp_path / "again.html")]) == 0
+    assert (tmp_path / "again.html").read_bytes() == Path(files["r.html"]).read_bytes()
+    assert Path(files["r.json"]).stat().st_size < 700_000
     found = json.loads(Path(files["r.json"]).read_text())
     text = Path(files["r.html"]).read_text()
     for name, entry in found["parameters"].items():
@@ -94,6 +100,51 @@ def test_page_without_interval_says_why(tmp_path, monkeypatch):
     monkeypatch.setattr("frac_accel.report.identification.response_uncertainty", refuse)
     pair = Record.load(BAG, axis="y")
     result = identify(pair, axis="y", structure="oscillator")
-    identification_page(result, pair, "y", {}).write(tmp_path / "r.html")
+    identification_page(result, {}).write(tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text()
     assert "without an interval: covariance: the data have not determined" in text
+
+
+def test_several_records_and_what_is_none_come_back(tmp_path):
+    """A result of two records has their agreement; a gain has no comparison of domains."""
+    pair = Record.load(BAG, axis="y")
+    for number, result in enumerate((identify([pair, pair], axis="y"),
+                                     identify(pair, axis="y", structure="gain"))):
+        path = tmp_path / f"{number}.json"
+        write_json(path, result.as_dict())
+        again = Identification.from_dict(json.loads(path.read_text()))
+        assert same(again.as_dict(), result.as_dict())
+        assert repr(again) == repr(result) and again.validation.verdict == result.validation.verdict
+        pages = [tmp_path / f"{number}_{name}.html" for name in ("first", "again")]
+        for found, page in zip((result, again), pages):
+            identification_page(found, {"date": "today"}).write(page)
+        assert pages[0].read_bytes() == pages[1].read_bytes()
+
+
+def same(one, other):
+    """Whether nested results are equal; null is NaN."""
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, list):
+        return len(one) == len(other) and all(map(same, one, other))
+    return one == other or all(value is None or value != value for value in (one, other))
+
+
+@pytest.mark.parametrize("damage", ["evidence", "points", "validation", "parameters"])
+def test_damaged_result_is_refused_in_one_line(tmp_path, capsys, result_file, damage):
+    data = json.loads(result_file)
+    data[damage] = {"nothing": "of it"}
+    path = tmp_path / "r.json"
+    path.write_text(json.dumps(data))
+    assert main(["report", str(path), "-o", str(tmp_path / "r.html")]) == 2
+    line, = capsys.readouterr().err.strip().splitlines()
+    assert str(path) in line and "result of an identification" in line
+    assert not (tmp_path / "r.html").exists()
+
+
+@pytest.fixture(scope="module")
+def result_file(tmp_path_factory):
+    """Text of a result file."""
+    path = tmp_path_factory.mktemp("result") / "r.json"
+    write_json(path, identify(Record.load(BAG, axis="y"), "y", "oscillator").as_dict())
+    return path.read_text()

@@ -104,7 +104,7 @@ def test_a_stream_of_lost_samples_is_not_given_a_wrong_rate():
     kept = rng.random(len(record.sensor)) > 0.9
     kernel = Corrector(model, noise_std=0.01)
     result = kernel.process(record.stamps_ns[kept], record.sensor[kept])
-    assert len(result) == 0 and kernel.sample_rate_hz is None
+    assert len(result) == 0 and kernel.sampling_rate_hz is None
     assert kernel.counters["without_rate"] >= 1000
     with pytest.raises(FracAccelError, match="sampling rate cannot be estimated"):
         kernel.finish()
@@ -117,7 +117,7 @@ def test_and_it_starts_when_enough_come():
     whole, parts = Corrector(model), Corrector(model)
     one = whole.process(stamps, values)
     many = [parts.process(stamps[i:i + 37], values[i:i + 37]) for i in range(0, len(stamps), 37)]
-    assert abs(whole.sample_rate_hz / RATE - 1) < 1e-3 and len(one) > 6500
+    assert abs(whole.sampling_rate_hz / RATE - 1) < 1e-3 and len(one) > 6500
     np.testing.assert_array_equal(one.values, np.concatenate([part.values for part in many]))
     assert whole.counters == parts.counters
 

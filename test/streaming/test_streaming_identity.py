@@ -211,7 +211,7 @@ def test_rate_that_is_never_known_is_said():
     kernel = Corrector(oscillator())
     kernel.process([START] * 5, np.zeros((5, 3)))
     assert kernel.counters["waiting"] == 5
-    with pytest.raises(FracAccelError, match="sample_rate_hz"):
+    with pytest.raises(FracAccelError, match="sampling_rate_hz"):
         kernel.finish()
 
 
@@ -219,9 +219,9 @@ def test_short_stream_is_flushed_by_finish():
     kernel = Corrector(oscillator())
     stamps = START + np.arange(60) * 1_000_000
     assert len(kernel.process(stamps, np.ones((60, 3)))) == 0
-    assert kernel.sample_rate_hz is None
+    assert kernel.sampling_rate_hz is None
     assert len(kernel.finish()) > 0
-    assert kernel.sample_rate_hz == pytest.approx(1000.0)
+    assert kernel.sampling_rate_hz == pytest.approx(1000.0)
 
 
 @pytest.mark.parametrize("stamps, values, variance", [
@@ -233,7 +233,12 @@ def test_wrong_shapes_are_named(stamps, values, variance):
         Corrector(oscillator(), RATE).process(stamps, values, variance)
 
 
+def test_the_first_name_of_the_rate_still_works():
+    kernel = Corrector(oscillator(), sample_rate_hz=RATE)
+    assert kernel.sample_rate_hz == kernel.sampling_rate_hz == RATE
+
+
 @pytest.mark.parametrize("rate", [-1.0, np.nan, np.inf])
 def test_bad_rate(rate):
-    with pytest.raises(FracAccelError, match="sample_rate_hz"):
+    with pytest.raises(FracAccelError, match="sampling_rate_hz"):
         Corrector(oscillator(), rate)

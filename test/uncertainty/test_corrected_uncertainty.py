@@ -39,7 +39,7 @@ def trial(rng, relative_std):
     excitation = rig.band_noise(rng, RATE_HZ, 0.5, band_hz, (1.0, 0.0, 0.0), lead_s=0.1)
     record = rig.simulate_record(sensor, excitation)
     model = model_of(values, std)
-    corrected = Corrector(model, sample_rate_hz=RATE_HZ).process(record.sensor_stamps_ns,
+    corrected = Corrector(model, sampling_rate_hz=RATE_HZ).process(record.sensor_stamps_ns,
                                                                  record.sensor)
     place = np.round((corrected.stamps_ns - record.stamps_ns[0]) * 1e-9 * RATE_HZ).astype(int)
     error = corrected.values[:, 0] - record.reference[place, 0]

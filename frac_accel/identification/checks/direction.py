@@ -7,6 +7,7 @@ import numpy as np
 from ...errors import IdentificationError
 from ..fit.output_error import Fit, fit_output_error
 from ..fit.structures import OscillatorStructure
+from ..fit.uncertainty import SIGNIFICANT
 from ..response.excitation import strongest_stretch
 
 # The strongest stretch of a long record [samples] tells the direction.
@@ -23,9 +24,8 @@ _SENSOR = 0.15
 # well damped sensor may also be a link with a lead.
 _PEAK = 0.6
 _ALONE = 0.5
-# Standard uncertainties, and samples, by which a delay must be negative; samples by which it is
-# worth telling.
-_SIGNIFICANT = 3.0
+# Samples by which a delay must be negative beyond its uncertainty, and by which it is worth
+# telling; relative standard uncertainty of what is known.
 _SAMPLES = 0.1
 _NOTED = 0.5
 _KNOWN = 0.2
@@ -65,13 +65,13 @@ class _Way:
         # rounding may leave a variance below 0 where the data tell nothing
         variance = slopes @ self.fit.covariance @ slopes
         return variance > 0 and \
-            self.lead_s > _SIGNIFICANT * np.sqrt(variance) + _SAMPLES * self.sample_s
+            self.lead_s > SIGNIFICANT * np.sqrt(variance) + _SAMPLES * self.sample_s
 
     @property
     def causal(self):
         """Whether the sensor needs no negative delay."""
         std = self.fit.std[self.fit.names.index("delay_s")]
-        return self.fit["delay_s"] > -_SIGNIFICANT * std - _SAMPLES * self.sample_s
+        return self.fit["delay_s"] > -SIGNIFICANT * std - _SAMPLES * self.sample_s
 
     @property
     def is_sensor(self):
@@ -126,7 +126,7 @@ def judge_direction(fit, reference, sensor, pair):
         If they are exchanged.
     """
     std = fit.std[fit.names.index("delay_s")]
-    early = fit["delay_s"] < -_SIGNIFICANT * std - _SAMPLES / pair.sampling_rate_hz
+    early = fit["delay_s"] < -SIGNIFICANT * std - _SAMPLES / pair.sampling_rate_hz
     if not early and fit.rmse < _LACKING * fit.noise_std:
         return []
     forward = _Way.of(reference, sensor, pair, pair.lag_s)

@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 
 from ...errors import IdentificationError
 from ...model.core import Arx
+from ...signals.normal_equations import solve
 from ..response.excitation import (
     alternating_stretches,
     highest_excited,
@@ -18,8 +19,11 @@ from .continuous_poles import METHOD, continuous_poles
 from .output_error import Fit
 from .uncertainty import sandwich
 
+# Largest orders that are tried.
 MOST_POLES = 4
 MOST_ZEROS = 7
+# Ratio of singular values below which a direction is none.
+_SINGULAR = 1e-11
 # What is asked of the excitation: the poles of one oscillator and as many numerator coefficients.
 FEWEST_COEFFICIENTS = 4
 
@@ -422,8 +426,8 @@ class _Problem:
         # a missing sample spoils the rows in which it is a regressor
         used = np.convolve(~self.used, np.ones(self.poles + 1))[:self.rows] == 0
         instruments, regressors = self.slopes(output)[:, used], self.slopes(self.sensor)[:, used]
-        return _solve(instruments @ regressors.T, instruments @ self.sensor[used],
-                      np.sum(instruments**2, axis=1))
+        return solve(instruments @ regressors.T, instruments @ self.sensor[used],
+                      np.sum(instruments**2, axis=1), _SINGULAR)
 
     def search(self, coefficients, iterations=_ITERATIONS, small=_SMALL_GAIN):
         """Refined instrumental variables from given a, b; (theta, cost)."""
@@ -433,17 +437,18 @@ class _Problem:
         # constant and initial values are linear: with the wrong ones the first step would be lost
         cost, error, output, denominator = self.evaluate(theta)
         own = self.slopes(output, denominator)[len(coefficients):, self.used]
-        theta[len(coefficients):] = _solve(own @ own.T, own @ error[self.used],
-                                           np.sum(own**2, axis=1))
+        theta[len(coefficients):] = solve(own @ own.T, own @ error[self.used],
+                                           np.sum(own**2, axis=1), _SINGULAR)
         cost, error, output, denominator = self.evaluate(theta)
         for _ in range(iterations):
             slopes = self.slopes(output, denominator)
             right, size = slopes @ error, np.sum(slopes**2, axis=1)
-            found = self.descend(theta, _solve(self.refined(slopes, output, denominator), right,
-                                               size), cost)
+            found = self.descend(theta, solve(self.refined(slopes, output, denominator), right,
+                                              size, _SINGULAR), cost)
             if found is None:
                 own = slopes[:, self.used]
-                found = self.descend(theta, _solve(own @ own.T, right, size), cost)
+                found = self.descend(theta, solve(own @ own.T, right, size, _SINGULAR),
+                                     cost)
             if found is None:
                 break
             gained = cost - found[1][0]
@@ -500,10 +505,3 @@ def _result(record, problem, orders, theta, rate, lag_s):
     return ArxFit(names, values, factors @ covariance @ factors.T, full,
                   (orders, theta[:count]), (), None, 0.0, np.nan, orders,
                   rate, lag_s)
-
-
-def _solve(matrix, right, size):
-    """Solution of a normal system with columns of squared length `size`; of least length."""
-    scale = np.sqrt(np.maximum(size, 1e-300))
-    scaled = matrix / np.outer(scale, scale)
-    return np.linalg.lstsq(scaled, right / scale, rcond=1e-11)[0] / scale

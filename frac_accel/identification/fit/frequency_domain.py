@@ -15,9 +15,9 @@ _ROUGH_DELAYS = 1000
 _STARTS = 5
 # Trial steps from each start, before the best goes to the end.
 _TRIALS = 25
-# Steps from a fit in the time domain, the square of one that changes nothing any more [standard
-# uncertainties], and the reduced chi-squared up to which the minimum needs no rival.
-_DESCENT, _SETTLED, _SUITS = 12, 1e-6, 2.0
+# Steps to the end, and the reduced chi-squared up to which a minimum next to a fit in the time
+# domain needs no rival.
+_STEPS, _SUITS = 100, 2.0
 # Relative uncertainty below which a point is never trusted: that of the arithmetic.
 _FINEST = 1e-9
 
@@ -81,25 +81,15 @@ def fit_response(structure, points, sampling_rate_hz, delay_s=0.0, near=None):
         raise IdentificationError(f"{len(points)} points of the frequency response cannot give "
                                   f"{unknowns} parameters")
     problem = _Problem(structure, points, sampling_rate_hz)
-    descended = None if near is None else problem.descend(problem.start_at(near))
-    if descended is not None:
-        return problem.result(descended)
-    starts = problem.starts(delay_s, _STARTS) if near is None else \
-        [*problem.starts(delay_s, 1), problem.start_at(near)]
-    trials = [problem.search(start, _TRIALS) for start in starts]
-    best = problem.search(min(trials, key=lambda trial: trial.cost).x, 100)
+    trials = []
+    if near is not None:
+        trials = [problem.search(problem.start_at(near), _STEPS)]
+        if problem.reduced_chi_squared(trials[0]) < _SUITS:
+            return problem.result(trials[0])
+    trials += [problem.search(start, _TRIALS)
+               for start in problem.starts(delay_s, 1 if trials else _STARTS)]
+    best = problem.search(min(trials, key=lambda trial: trial.cost).x, _STEPS)
     return problem.result(best)
-
-
-@dataclasses.dataclass(frozen=True)
-class _Minimum:
-    """What `result` needs of a minimum; names as in `scipy.optimize.OptimizeResult`."""
-
-    x: np.ndarray
-    fun: np.ndarray
-    jac: np.ndarray
-    cost: float
-    active_mask: np.ndarray
 
 
 class _Problem:
@@ -172,28 +162,8 @@ class _Problem:
         return least_squares(self.error, start, self.jacobian, (self.low, self.high),
                              x_scale="jac", max_nfev=steps, xtol=1e-10, ftol=1e-10)
 
-    def descend(self, start):
-        """Minimum next to a good start, by Gauss-Newton steps; None if there is none as close."""
-        freedom = 2 * len(self.s) - len(start)
-        if freedom < 1 or np.any(start <= self.low) or np.any(start >= self.high):
-            return None
-        x, cost = start, np.inf
-        for _ in range(_DESCENT):
-            whole, slopes = self.parts(x)
-            error = self.weighted(whole - 1)
-            jacobian = np.stack([self.weighted(slope) for slope in slopes], axis=1)
-            if not 0.5 * error @ error < cost:
-                return None
-            cost = 0.5 * error @ error
-            scale = np.linalg.norm(jacobian, axis=0)
-            step = -np.linalg.lstsq(jacobian / scale, error, rcond=1e-12)[0]
-            if step @ step < _SETTLED * max(cost / freedom, 1.0):
-                close = 2 * cost < _SUITS * freedom
-                return _Minimum(x, error, jacobian, cost, np.zeros(len(x))) if close else None
-            x = x + step / scale
-            if np.any(x <= self.low) or np.any(x >= self.high):
-                return None
-        return None
+    def reduced_chi_squared(self, found):
+        return float(2 * found.cost / max(len(found.fun) - len(found.x), 1))
 
     def parts(self, unknowns):
         """Model over measured, and its derivatives by the unknowns."""
@@ -219,7 +189,7 @@ class _Problem:
         jacobian = found.jac.copy()
         jacobian[:, 1:-1] = jacobian[:, 1:-1] @ np.linalg.inv(factors)
         jacobian[:, -1] *= self.rate
-        chi_squared = 2 * found.cost / (len(found.fun) - len(found.x))
+        chi_squared = self.reduced_chi_squared(found)
         scale = np.linalg.norm(jacobian, axis=0)
         inverse = np.linalg.pinv(jacobian / scale, rcond=1e-12)
         covariance = inverse @ inverse.T / np.outer(scale, scale) * max(chi_squared, 1.0)
@@ -228,5 +198,5 @@ class _Problem:
                           if side)
         return ResponseFit(("sensitivity", *self.structure.names, "delay_s"), values, covariance,
                            found.fun, found.x[1:], at_bounds, None, 0.0, np.nan,
-                           float(chi_squared),
+                           chi_squared,
                            float(np.sqrt(np.mean(np.abs(self.parts(found.x)[0] - 1)**2))))

@@ -8,6 +8,7 @@ from scipy.fft import rfft
 
 from ...errors import IdentificationError
 from ...signals.convolution import Convolution
+from ...signals.normal_equations import solve
 from ..response.excitation import strongest_stretch
 from ..response.frequency_response import averaged_response, bulk_delay, phase_delay
 from .uncertainty import sandwich, white_noise
@@ -46,7 +47,7 @@ _START_LENGTH = 16384
 _TRIAL_ITERATIONS = 5
 # Share of the output's power, times the number of independent frequencies, that the best of all
 # resonances and delays still explains of an unrelated signal.
-_CHANCE = 10
+_UNRELATED = 10
 
 
 @dataclasses.dataclass(frozen=True)
@@ -339,7 +340,7 @@ class _Problem:
         free = np.ones(len(theta), bool)
         while True:
             step = np.zeros(len(theta))
-            step[free] = _solve(matrix[np.ix_(free, free)], slope[free])
+            step[free] = solve(matrix[np.ix_(free, free)], slope[free])
             step /= max(1, np.max(np.abs(step)))
             outwards = np.where(step < 0, theta <= self.low, (theta >= self.high) & (step > 0))
             stuck = free & outwards
@@ -359,11 +360,11 @@ class _Problem:
         known = state.rows[:count]
         gram = state.gram[:count, :count]
         straight = step @ slopes
-        straight -= _solve(gram, known @ straight) @ known
+        straight -= solve(gram, known @ straight) @ known
         curved = 2 / _AHEAD * ((ahead.residual - state.residual) / _AHEAD + straight)
-        curved -= _solve(gram, known @ curved) @ known
+        curved -= solve(gram, known @ curved) @ known
         scale = np.sqrt(np.diag(matrix))
-        bend = np.where(step == 0, 0.0, 0.5 * _solve(matrix, slopes @ curved))
+        bend = np.where(step == 0, 0.0, 0.5 * solve(matrix, slopes @ curved))
         small = np.linalg.norm(scale * bend) < 0.75 * np.linalg.norm(scale * step)
         return bend if small else np.zeros(len(step))
 
@@ -372,7 +373,7 @@ class _Problem:
         known = rows[:count]
         # what was over before the first used sample fades out of the fit instead of dropping out
         faint = np.diag(np.r_[0.0, 0.0, np.full(count - 2, _FAINT**2)])
-        linear = _solve(known @ known.T + faint, known @ self.sensor)
+        linear = solve(known @ known.T + faint, known @ self.sensor)
         residual = self.sensor - linear @ known
         noise = residual @ residual / len(residual)
         real = swing is not None and np.sum((linear[2:4] @ known[2:4])**2) > _FEIGNED * noise
@@ -393,7 +394,7 @@ class _Problem:
 
     def require_relation(self, state):
         explained = self.explained(state)
-        if explained < 0.5 and explained < _CHANCE / self.independent():
+        if explained < 0.5 and explained < _UNRELATED / self.independent():
             raise IdentificationError(
                 "the sensor's output has nothing to do with the reference: the best model explains "
                 f"{max(explained, 0):.2%} of its power, which chance alone can do; were both "
@@ -453,7 +454,7 @@ class _Problem:
             if stuck.any():
                 # the bound is ours, not the sensor's: how far the data would go is not known better
                 gram, right = jacobian @ jacobian.T, jacobian @ state.residual
-                beyond = _solve(gram, right)
+                beyond = solve(gram, right)
                 within += np.outer(beyond, beyond)
             covariance = np.zeros_like(covariance)
             covariance[np.ix_(free, free)] = within[:len(free), :len(free)]
@@ -505,7 +506,7 @@ class _State:
         """Normal matrix and slope of the unknowns, the linear coefficients eliminated."""
         count, gain = len(self.linear), self.linear[0]
         gram, across = self.gram, gain * self.gram[count:, :len(self.linear)]
-        inner = gain**2 * gram[count:, count:] - across @ _solve(gram[:count, :count], across.T)
+        inner = gain**2 * gram[count:, count:] - across @ solve(gram[:count, :count], across.T)
         # the residual is orthogonal to the linear rows: only the slopes see it
         return inner, gain * self.right[count:] - across @ self.linear
 
@@ -572,12 +573,3 @@ def _exponential(first, step, count):
 
 def _real(values):
     return np.concatenate([values.real, values.imag], axis=-1)
-
-
-def _solve(matrix, right):
-    """Solution of a scaled normal system, of least length where it is singular."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix / np.outer(scale, scale)
-    divided = right / (scale if right.ndim == 1 else scale[:, None])
-    solved = np.linalg.lstsq(scaled, divided, rcond=1e-12)[0]
-    return solved / (scale if right.ndim == 1 else scale[:, None])

@@ -7,6 +7,9 @@ from ...model.core.oscillator import tail_rates
 from ...model.core.principal_sheet import fractional_root
 from ...model.core.sensor_form import from_sensor_parameters
 
+# Where a search begins: frequencies between the lowest and the highest excited one, damping ratios,
+# orders of the damping; the general equation's order of inertia, its highest order of damping, and
+# the ratio and order of its slope.
 _FREQUENCIES = 24
 _DAMPINGS = (0.02, 0.08, 0.25, 0.7, 1.5)
 _ORDERS = (0.4, 0.7, 1.0, 1.3, 1.6)

@@ -4,6 +4,8 @@ import numpy as np
 from scipy.fft import next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
+# Standard uncertainties from which on a parameter differs from another value.
+SIGNIFICANT = 3.0
 # Padding of the spectra, in roots of the record.
 _REACH = 12
 # Share of a band's noise that a residual shows at least.

@@ -6,19 +6,18 @@ import numpy as np
 
 from ...errors import FracAccelError, IdentificationError
 from ..fit.structures import OscillatorStructure
+from ..fit.uncertainty import SIGNIFICANT
 from ..response.excitation import excited_band
 from ..response.frequency_response import linear_share
 from .candidate import Candidate, fit_of, fitted
 from .fit_validation import judge_residual
 from .records import agreement, combine, freed, is_open
 
-# Standard uncertainties by which the damping order must differ from 1 to be called fractional.
-_SIGNIFICANT = 3.0
 # Share of an oscillator's held-out residual that a model which names no cause may leave.
 _CLEARLY = 0.7
 # Share of what a linear model could still explain of the classical residual that a fractional
 # damping must take away, and the share of a residual that chance alone seems to explain.
-_TAKEN, _CHANCE = 0.25, 0.1
+_TAKEN, _SEEMING = 0.25, 0.1
 # A resonance that far above the excited band, or known no better than this, is out of sight; of a
 # gain, the held-out residual over that with a resonance with which the gain will do.
 _IN_SIGHT, _UNDETERMINED, _NO_BETTER = 1.5, 0.2, 1.05
@@ -73,7 +72,7 @@ def flat_instead(data):
                         for values in (classical.fit.values, classical.fit.std))
     if flat.held_out_nrmse <= _NO_BETTER * classical.held_out_nrmse:
         why = "does not predict clearly better than a gain"
-    elif delay < -_SIGNIFICANT * delay_std:
+    elif delay < -SIGNIFICANT * delay_std:
         why = (f"would answer {-delay:.3g} s before the reference moves, as if that were smoothed; "
                "its parameters are open, and a gain is all that can be said")
     else:
@@ -128,7 +127,7 @@ def _preferred(classical, fractional, datas, judged):
     score = f"damping order {order:.4g} +- {std:.2g}"
     held_out = (f"{judged} {fractional.held_out_nrmse:.3%} against "
                 f"{classical.held_out_nrmse:.3%} of the classical model")
-    if abs(order - 1) <= _SIGNIFICANT * std:
+    if abs(order - 1) <= SIGNIFICANT * std:
         return classical, f"a fractional damping is not significant: {score}"
     if not fractional.held_out_nrmse < classical.held_out_nrmse:
         return classical, f"a fractional damping does not predict better: {held_out}"
@@ -148,7 +147,7 @@ def _explains(classical, fractional, datas):
     for one, other, data in zip(classical.fits, fractional.fits, datas):
         power = (one.rmse / data.spread)**2
         taken += power - (other.rmse / data.spread)**2
-        lacking += power * max(linear_share(data.reference, one.residual) - _CHANCE, 0.0)
+        lacking += power * max(linear_share(data.reference, one.residual) - _SEEMING, 0.0)
     return taken >= _TAKEN * lacking
 
 

@@ -8,10 +8,12 @@ from scipy.signal.windows import tukey
 from ...errors import FracAccelError
 from ...model import AxisModel
 from ...model.effects import identified_effect
+from ...model.parameters import rebuilt
 from ...signals.averaged_spectra import coherence_of, power_of, segment_spectra
 from ...signals.convolution import Convolution
 from ...uncertainty import UncertainAxis
-from .residual_tests import ResidualTests, residual_tests
+from .records import RecordAgreement
+from .residual_tests import ResidualTests, p_words, residual_tests
 
 # Held-out residual over the noise floor, and over the output, above which an octave lacks more.
 _ABOVE_FLOOR = 2.0
@@ -61,7 +63,7 @@ class FitValidation:
 
     residual: ResidualTests | None
     held_out_bands: tuple
-    records: object
+    records: RecordAgreement | None
     verdict: list
 
     def as_dict(self):
@@ -69,6 +71,13 @@ class FitValidation:
         return {"residual": self.residual and self.residual.as_dict(),
                 "held_out_bands": [dataclasses.asdict(band) for band in self.held_out_bands],
                 "records": self.records and self.records.as_dict(), "verdict": self.verdict}
+
+    @classmethod
+    def from_dict(cls, data):
+        """The same from the plain lists of a result file."""
+        return cls(data["residual"] and rebuilt(ResidualTests, data["residual"]),
+                   tuple(rebuilt(BandFit, band) for band in data["held_out_bands"]),
+                   data["records"] and rebuilt(RecordAgreement, data["records"]), data["verdict"])
 
     def essentials(self):
         """What a model file keeps of it."""
@@ -177,11 +186,6 @@ def band_fits(measured, simulated, sampling_rate_hz, bands):
                                           / np.sum(power[inside])))
     return [BandFit(tuple(map(float, band)), float(ratio), floor)
             for band, ratio, floor in zip(bands, nrmse, floors)]
-
-
-def p_words(p_value):
-    """A p value as text."""
-    return "p < 1e-6" if p_value < 1e-6 else f"p = {p_value:.2g}"
 
 
 def _residual_words(tests, nrmse):

@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 from scipy.stats import chi2
 
-from .fit_validation import p_words
-from .residual_tests import SIGNIFICANCE
+from .residual_tests import SIGNIFICANCE, p_words
 
 # It changes with temperature and with how the sensor lies: no sign of another sensor.
 _OWN_TO_EACH_RECORD = ("offset",)

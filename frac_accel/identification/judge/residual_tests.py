@@ -81,6 +81,11 @@ class ResidualTests:
                 "white": self.white, "independent": self.independent}
 
 
+def p_words(p_value):
+    """A p value as text."""
+    return "p < 1e-6" if p_value < 1e-6 else f"p = {p_value:.2g}"
+
+
 def residual_tests(residual, reference, valid=None, gradient=None):
     r"""Test a residual for whiteness and for independence of the reference.
 

@@ -5,6 +5,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from ...signals.averaged_spectra import coherence_of, power_of, segment_spectra
 
+# Segments of the average, and frequencies that are kept of it.
 _SEGMENTS = 4
 _MOST_BINS = 200
 # Power of a line, of the strongest, whose phase counts.

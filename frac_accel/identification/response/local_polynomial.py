@@ -7,6 +7,7 @@ from scipy.ndimage import uniform_filter1d
 from .frequency_response import bulk_delay
 
 METHOD = "local polynomial in bands"
+# Degree of the polynomials.
 _ORDER = 2
 # Bins of a band beyond the unknowns: degrees of freedom of its variance, before its neighbours'.
 _SPARE = 6

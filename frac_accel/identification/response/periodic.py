@@ -19,7 +19,7 @@ _NOTHING = 1e-8
 # Degrees of freedom that the variance of a line gets, with its neighbours' where periods are few.
 _FREEDOM = 20
 # Standard deviations by which silent lines must rise above the noise to be called distorted.
-_SIGNIFICANT = 5.0
+_DISTORTED = 5.0
 _FEWEST_LINES = 4
 # Harmonics of the highest excited line up to which distortion is looked for.
 _REACH = 3
@@ -186,7 +186,7 @@ def _rise(spectra, signal):
     ratio = mean / np.maximum(noise, 1e-300)
     spread = np.sqrt((1 + 1 / freedom) / count)
     excess = np.mean(mean) - np.mean(noise)
-    found = bool(np.mean(ratio) > 1 + _SIGNIFICANT * spread and excess > 0)
+    found = bool(np.mean(ratio) > 1 + _DISTORTED * spread and excess > 0)
     return (found, _db(excess / signal) if found else float("nan"), _db(np.mean(noise) / signal),
             _db(np.mean(ratio)))
 

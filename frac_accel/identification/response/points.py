@@ -6,8 +6,9 @@ import numpy as np
 
 from ...errors import IdentificationError
 from ...model import AXES
+from ...model.parameters import rebuilt
 from . import local_polynomial, periodic, stepped_sine
-from .recognise import Recognised, recognise
+from .recognise import Recognised, Tone, recognise
 
 # Run of samples without a gap that bands of a spectrum need.
 _FEWEST_SAMPLES = 256
@@ -21,7 +22,7 @@ class ResponsePoints:
     ----------
     frequency_hz : ndarray, shape (m,)
         In rising order.
-    response : ndarray of complex, shape (m,)
+    amplitude, phase_rad : ndarray, shape (m,)
         Sensor's output per acceleration [output units per m/s²], the pair's delay included.
     std_amplitude : ndarray, shape (m,)
         Relative standard uncertainty of the amplitude.
@@ -40,7 +41,8 @@ class ResponsePoints:
     """
 
     frequency_hz: np.ndarray
-    response: np.ndarray
+    amplitude: np.ndarray
+    phase_rad: np.ndarray
     std_amplitude: np.ndarray
     std_phase_rad: np.ndarray
     method: str
@@ -52,15 +54,23 @@ class ResponsePoints:
     def __len__(self):
         return len(self.frequency_hz)
 
-    def as_dict(self):
-        """Plain numbers, lists and words."""
-        return {"frequency_hz": self.frequency_hz.tolist(),
-                "amplitude": np.abs(self.response).tolist(),
-                "phase_rad": np.angle(self.response).tolist(),
-                "std_amplitude": self.std_amplitude.tolist(),
-                "std_phase_rad": self.std_phase_rad.tolist(),
-                "method": self.method, "distortion": self.distortion,
-                "segments": self.segments, "notes": self.notes}
+    @classmethod
+    def of(cls, frequency_hz, response, std, *others):
+        """Points whose complex response has the same relative uncertainty along and across it."""
+        return cls(frequency_hz, np.abs(response), np.angle(response), std, std, *others)
+
+    @property
+    def response(self):
+        """Amplitude and phase as complex numbers, shape (m,)."""
+        return self.amplitude * np.exp(1j * self.phase_rad)
+
+    @classmethod
+    def from_dict(cls, data):
+        """Points from the plain lists of a result file."""
+        excitation = data["excitation"]
+        tones = tuple(Tone(**tone) for tone in excitation["tones"])
+        return dataclasses.replace(rebuilt(cls, data),
+                                   excitation=Recognised(**{**excitation, "tones": tones}))
 
 
 def response_points(pair, axis="x"):
@@ -98,8 +108,8 @@ def response_points(pair, axis="x"):
         raise IdentificationError("the sensor's output follows the reference at no frequency well "
                                   "enough to give a point of its frequency response")
     # the sensor's samples are later than the instants of the reference
-    lag = np.exp(-2j * np.pi * points.frequency_hz * pair.lag_s)
-    return dataclasses.replace(points, response=points.response * lag)
+    phase = points.phase_rad - 2 * np.pi * points.frequency_hz * pair.lag_s
+    return dataclasses.replace(points, phase_rad=np.angle(np.exp(1j * phase)))
 
 
 def _from_dwells(excitation, reference, sensor, valid, rate):
@@ -126,9 +136,8 @@ def _from_dwells(excitation, reference, sensor, valid, rate):
 
     def gathered(name):
         return np.array([getattr(dwell, name) for dwell in dwells])
-    return ResponsePoints(gathered("frequency_hz"), gathered("response"), gathered("std"),
-                          gathered("std"), stepped_sine.METHOD, excitation, distortion, segments,
-                          notes)
+    return ResponsePoints.of(gathered("frequency_hz"), gathered("response"), gathered("std"),
+                             stepped_sine.METHOD, excitation, distortion, segments, notes)
 
 
 def _whole_periods(valid, period):
@@ -142,8 +151,8 @@ def _from_periods(excitation, reference, sensor, valid, rate):
              ((found.transient, "transient"), (found.holed, "samples missing")) if count]
     segments = [{"start_s": found.start / rate, "stop_s": found.stop / rate,
                  "periods": found.periods}]
-    return ResponsePoints(found.frequency_hz, found.response, found.std, found.std,
-                          periodic.METHOD, excitation, found.distortion, segments, notes)
+    return ResponsePoints.of(found.frequency_hz, found.response, found.std, periodic.METHOD,
+                             excitation, found.distortion, segments, notes)
 
 
 def _from_bands(excitation, reference, sensor, valid, rate):
@@ -158,8 +167,8 @@ def _from_bands(excitation, reference, sensor, valid, rate):
     notes = [] if stop - start == len(valid) else [
         f"frequency response from the longest run without a gap, {start / rate:.4g} s to "
         f"{stop / rate:.4g} s"]
-    return ResponsePoints(frequency, response, std, std, local_polynomial.METHOD, excitation, None,
-                          [{"start_s": start / rate, "stop_s": stop / rate}], notes)
+    return ResponsePoints.of(frequency, response, std, local_polynomial.METHOD, excitation, None,
+                             [{"start_s": start / rate, "stop_s": stop / rate}], notes)
 
 
 def _longest_run(valid):

@@ -55,6 +55,12 @@ def read_bag(path: str | Path, topics: Sequence[str] | None = None) -> dict[str,
     ------
     BagError
         If the bag or a topic cannot be read, a topic is missing, of another type or empty.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> frac_accel.read_bag("bags/classical_bench.mcap")["/imu/data_raw"].values.shape
+    (4000, 3)
     """
     reader = BagReader(path)
     if topics is None:
@@ -90,6 +96,15 @@ def write_bag(path: str | Path, topics: Mapping[str, Samples | Temperatures]) ->
     Parameters
     ----------
     path : a name that ends in .mcap for a bare file (replaced if it exists), else a new folder
+
+    Examples
+    --------
+    >>> import os, tempfile, frac_accel
+    >>> topics = frac_accel.read_bag("bags/classical_bench.mcap")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     frac_accel.write_bag(os.path.join(folder, "copy.mcap"), topics)
+    ...     sorted(os.listdir(folder)), sorted(topics)
+    (['copy.mcap'], ['/imu/data_raw', '/imu/reference'])
     """
     names = list(topics)
     numbers = [np.full(len(topics[name].stamps_ns), i) for i, name in enumerate(names)]

@@ -8,7 +8,7 @@ from .map import HELPS, SEEMS
 from .virtual import NATURAL_HZ
 
 # Probability below which an error is more than its uncertainty.
-_SIGNIFICANT = 0.01
+_P_VALUE = 0.01
 
 
 def answer(bench, cells, refusal):
@@ -30,7 +30,7 @@ def answer(bench, cells, refusal):
 
 def at_floor(judged):
     """Whether a held-out error is no more than its uncertainty."""
-    return judged.p_value >= _SIGNIFICANT
+    return judged.p_value >= _P_VALUE
 
 
 def rival(result):
