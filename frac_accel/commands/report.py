@@ -11,6 +11,8 @@ from ._common import require_report
 
 _LARGEST = 64 * 2**20
 """Bytes of a result."""
+_NOT_A_RESULT = LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError
+"""What drawing a page of anything else ends in."""
 
 
 def add_arguments(parser):
@@ -24,11 +26,22 @@ def run(arguments):
     require_report(arguments.output)
     data = _read(arguments.result)
     try:
-        found = Diagnosis.from_dict(data)
-    except FracAccelError as error:
-        raise FracAccelError(f"{arguments.result}: {error}") from None
-    diagnosis_page(found, data.get("provenance")).write(arguments.output)
+        diagnosis_page(_diagnosis(arguments.result, data), data.get("provenance")).write(
+            arguments.output)
+    except FracAccelError:
+        raise
+    except _NOT_A_RESULT as error:
+        raise FracAccelError(
+            f"{arguments.result}: no complete result of a diagnosis, expected what frac_accel "
+            f"diagnose --json writes ({type(error).__name__})") from None
     say(f"{arguments.output}: written")
+
+
+def _diagnosis(path, data):
+    try:
+        return Diagnosis.from_dict(data)
+    except FracAccelError as error:
+        raise FracAccelError(f"{path}: {error}") from None
 
 
 def _read(path):

@@ -171,18 +171,20 @@ class _Child:
 
 def _warm_up():
     """Compile and load what the first case would pay for."""
+    # a bar is for eyes; read when tqdm is loaded
+    os.environ["TQDM_DISABLE"] = "1"
     rng = np.random.default_rng(0)
     model = {**seeds.PLAIN, "effects": [
         {"cause": "cubic_stiffness", "alpha3": 1e-6}, {"cause": "coulomb_friction", "level": 1e-3},
         {"cause": "hysteresis", "strength": 0.1, "beta": 1.0, "gamma": 0.0}]}
     seeds.samples(rng, model, 100)
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        seeds.results()
 
 
 def _serve(pipe):
     """Judge what the pipe asks for, within the limits."""
     faulthandler.disable()
-    # a bar is for eyes
-    os.environ["TQDM_DISABLE"] = "1"
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * os.sysconf("SC_PAGE_SIZE") + MOST_BYTES
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
