@@ -8,6 +8,8 @@ that makes it, so what is decided depends on the samples and their order alone. 
   same for seconds at rest, so it counts as *stuck* (*dead* at exactly zero) only after
   `STUCK_S` while another axis moves by `MOVES` of its own smallest steps or more; after `COARSE_S`
   where the axis is used to repeating itself; and after `LONG_S` if nothing moves at all;
+* *not connected*: dead, and never anything but zero since the start, as an axis that a sensor
+  of one or two axes does not have;
 * *saturated*: more than half of a frame's samples at the limits of the model, twice in a row;
 * *held*: more than `REPEATED` of the samples repeat the one before while the others jump by
   `JUMPS` of its smallest steps: the messages come faster than the sensor samples;
@@ -27,7 +29,8 @@ CLEAR_FRAMES = 10
 _NOISE_SHARE, _OTHER_SHARE = 1e-3, 1e-6
 # Share of repetitions from which on an axis is used to them, and how slowly that is learnt.
 _USED_TO, _LEARNS = 0.1, 0.05
-FAULTS = ("", "dead", "stuck", "saturated", "held", "too fast")
+NOT_CONNECTED = "not connected"
+FAULTS = ("", "dead", "stuck", "saturated", "held", "too fast", NOT_CONNECTED)
 
 
 class AxisMonitors:
@@ -56,6 +59,7 @@ class AxisMonitors:
         self._largest_step = largest_rate / sampling_rate_hz or np.inf
         self._part, self._count = [], 0
         self._last = None
+        self._only_zero = np.ones(3, bool)
         self._lattice = np.full(3, np.inf)
         # coarse until it has shown that it is not
         self._repeats = np.ones(3)
@@ -112,6 +116,8 @@ class AxisMonitors:
         repeated = np.mean(steps == 0, axis=0)
         found = np.zeros(3, int)
         self._find_still(frame, span, repeated, found)
+        self._only_zero &= (frame == 0).all(axis=0)
+        found[(found == 1) & self._only_zero] = FAULTS.index(NOT_CONNECTED)
         at_limit = np.mean((frame <= self._limits[0]) | (frame >= self._limits[1]), axis=0) > 0.5
         self._at_limit = np.where(at_limit, self._at_limit + 1, 0)
         found[self._at_limit >= 2] = 3

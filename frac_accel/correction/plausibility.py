@@ -53,6 +53,8 @@ class Plausibility:
     ----------
     held : tuple of ndarray
         Index, stamps, values and variance of the samples that are not yet decided on.
+    learns : bool
+        Whether the record itself says what can be true.
     """
 
     def __init__(self, low, high, floor):
@@ -67,7 +69,7 @@ class Plausibility:
         self._low, self._high = low, high
         # sizes below it are within the range on every axis: quick to see
         self._symmetric = min(-low.max(), high.min())
-        self._learns = floor is not None
+        self.learns = floor is not None
         self._floor = floor
 
     @property
@@ -105,7 +107,7 @@ class Plausibility:
         if not largest.max() < self._symmetric:
             finite = np.isfinite(size).all(axis=1)
             plausible = finite & ((values >= self._low) & (values <= self._high)).all(axis=1)
-        if not self._learns:
+        if not self.learns:
             return *samples, plausible, finite
         if self._peak is None:
             good = values[:HOLD] if plausible is None else values[:HOLD][plausible[:HOLD]]

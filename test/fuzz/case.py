@@ -12,8 +12,8 @@ from . import damage, seeds
 # How often each command has its turn; those without an entry read no such input, with the reason.
 SHARES = {"correct": 0.3, "simulate": 0.2, "validate": 0.2, "identify": 0.15, "diagnose": 0.1,
           "budget": 0.05}
-# Every tenth case is a report's; their numbers say so, that those of the others stay what they were.
-REPORT_EVERY = 10
+# Those whose number this divides.
+BY_NUMBER = {"report": 10}
 WITHOUT = {"paper": "its study takes minutes; it reads bags as identify and diagnose do",
            "bench": "it reads no file"}
 DAMAGES = {"bag octets": 0.2, "bag records": 0.25, "bag samples": 0.2, "metadata": 0.08,
@@ -33,7 +33,7 @@ def make(number, folder):
         Which damage it is.
     """
     rng = np.random.default_rng(number)
-    if number % REPORT_EVERY == 0:
+    if number % BY_NUMBER["report"] == 0:
         return _report(folder, rng)
     verb = _choice(SHARES, rng)
     what = _choice(DAMAGES, rng)

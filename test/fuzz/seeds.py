@@ -136,7 +136,7 @@ def _value(field, rng):
 
 @functools.cache
 def results():
-    """What ``diagnose --json`` writes of some records: with causes, without, and with too little."""
+    """What ``diagnose --json`` writes of records with causes, without, and too short."""
     from frac_accel.cli import main
     springs = {**PLAIN, "effects": [{"cause": "cubic_stiffness", "alpha3": 1e-3},
                                     {"cause": "time_delay", "delay_s": 5e-4}]}
