@@ -1,7 +1,7 @@
 """A fixed share of the damaged inputs of `fuzz`: each refused in one line, or worked on."""
 
 import pytest
-from fuzz import case, runner
+from fuzz import case, live, runner
 
 from frac_accel.cli import VERBS
 
@@ -12,6 +12,12 @@ GROUPS, CASES = 4, 50
 @pytest.mark.parametrize("group", range(GROUPS))
 def test_damaged_inputs_are_refused_or_worked_on(group):
     assert runner.run(range(group * CASES, (group + 1) * CASES)) == {}
+
+
+def test_any_model_file_is_taken_or_refused_while_the_corrector_works():
+    seen = []
+    assert runner.run(range(60), None, lambda *told: seen.append(told[2]), live.judge) == {}
+    assert {"accepted", "refused"} <= {*seen}
 
 
 # Numbers of cases that once went wrong.

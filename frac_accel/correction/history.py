@@ -46,7 +46,7 @@ class UnknownHistory:
         self._filter, self._level, self._is_known = parallel_filter, level[:, None], is_known
         self._count = 0
         self._sums = np.zeros((3, len(level)))
-        self._seen = np.empty((len(level), 0))
+        self._seen = np.empty((len(level), LONGEST))
         self._power = self._between = self._summed = np.zeros(len(level))
         self._mean = np.zeros(len(level))
         self._next, self._weighed = 1, np.empty((2, 0))
@@ -66,21 +66,22 @@ class UnknownHistory:
     def _advance(self, values):
         number = self._count + 1.0 + np.arange(values.shape[1])
         self._count += values.shape[1]
-        if self._count <= LONGEST:
-            mean = self._means(values - self._level, number)
-            if self._count in _LOOKS:
-                self._look()
-        else:
-            mean = self._mean[:, None]
+        mean = (self._means(values - self._level, number) if self._count <= LONGEST
+                else self._mean[:, None])
         total, single = self._weights(len(number))
         if self._is_known:
-            return np.zeros(values.shape), self._power[:, None] * total**2
-        unknown = _LEVELS * self._between[:, None] + self._power[:, None] * (_FEW / number)**2
-        return mean * total, unknown * total**2 + _SUMS * self._summed[:, None] * single**2
+            added, variance = np.zeros(values.shape), self._power[:, None] * total**2
+        else:
+            unknown = _LEVELS * self._between[:, None] + self._power[:, None] * (_FEW / number)**2
+            added = mean * total
+            variance = unknown * total**2 + _SUMS * self._summed[:, None] * single**2
+        if self._count in _LOOKS:
+            self._look()
+        return added, variance
 
     def _means(self, apart, number):
         """Weighted means (k, n) of the distances from the level up to each sample."""
-        self._seen = np.concatenate([self._seen, apart], axis=1)
+        self._seen[:, self._count - len(number):self._count] = apart
         at = number - 0.5
         sums = []
         for i, weight in enumerate((np.ones(len(at)), at, at**2)):
@@ -93,14 +94,14 @@ class UnknownHistory:
         return mean
 
     def _look(self):
-        seen = self._seen
+        seen = self._seen[:, :self._count]
         self._power = np.mean(seen**2, axis=1)
         quarters = [part.mean(axis=1) for part in np.array_split(seen, min(4, seen.shape[1]), 1)]
         self._between = np.var(quarters, axis=0, ddof=1) / len(quarters)
         about = np.cumsum(seen - seen.mean(axis=1, keepdims=True), axis=1)
         self._summed = np.mean(about**2, axis=1)
         if self._count == _LOOKS[-1]:
-            self._seen = self._seen[:, :0]
+            self._seen = None
 
     def _weights(self, count):
         """T and h of the next samples, or their bounds, shape (2, count).

@@ -40,7 +40,7 @@ def make(number, folder):
     if verb == "identify" and what.startswith("model"):
         what = "bag samples"
     bag = _bag(what, folder, rng)
-    (folder / "m.yaml").write_bytes(_model(what, rng))
+    (folder / "m.yaml").write_bytes(model_file(what, rng))
     arguments, outputs = [verb, str(bag)], []
     if verb != "identify" and not (verb in ("diagnose", "budget") and rng.random() < 0.3
                                    and not what.startswith("model")):
@@ -117,7 +117,8 @@ def _bag(what, folder, rng):
     return bag
 
 
-def _model(what, rng):
+def model_file(what, rng):
+    """Octets of a model's file, with this damage or a whole one."""
     model = seeds.PLAIN if not what.startswith("model") and rng.random() < 0.5 else (
         seeds.model_of(rng))
     if what == "model tree":
@@ -125,5 +126,7 @@ def _model(what, rng):
             return seeds.text_of(damage.tree(model, rng)).encode("utf-8", "surrogatepass")
         except yaml.YAMLError:
             return seeds.text_of(model).encode()
+    if what == "model sizes":
+        model = damage.sizes(model, rng)
     words = seeds.text_of(model)
     return damage.text(words, rng) if what == "model text" else words.encode()

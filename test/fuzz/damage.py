@@ -94,6 +94,15 @@ def tree(data, rng):
     return data
 
 
+def sizes(data, rng):
+    """Nested dicts and lists in which some numbers are up to a hundred times as large or small."""
+    data = copy.deepcopy(data)
+    for holder, key in _places(data):
+        if isinstance(holder[key], float) and rng.random() < 0.3:
+            holder[key] *= 10 ** rng.uniform(-2, 2)
+    return data
+
+
 def branch(data, rng):
     """The same at places that are reached by a walk from the root: long lists are not hit more."""
     data = copy.deepcopy(data)

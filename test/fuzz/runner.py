@@ -102,7 +102,7 @@ def _trouble(path):
     return ""
 
 
-def run(numbers, keep=None, told=lambda number, what, status, wrong: None):
+def run(numbers, keep=None, told=lambda number, what, status, wrong: None, judging=judge):
     """Judge cases, in a child that is replaced when one kills it.
 
     Parameters
@@ -112,6 +112,8 @@ def run(numbers, keep=None, told=lambda number, what, status, wrong: None):
         Folder for the inputs of cases with which something is wrong.
     told : callable, optional
         Gets each case's number, what it is, the exit status and what is wrong.
+    judging : callable
+        `judge`, or that of `live`.
 
     Returns
     -------
@@ -119,7 +121,7 @@ def run(numbers, keep=None, told=lambda number, what, status, wrong: None):
         What is wrong, by case; those with which nothing is are left out.
     """
     found = {}
-    child = _Child()
+    child = _Child(judging)
     try:
         for number in numbers:
             with tempfile.TemporaryDirectory(prefix="fuzz-") as folder:
@@ -137,14 +139,16 @@ def run(numbers, keep=None, told=lambda number, what, status, wrong: None):
 
 
 class _Child:
-    def __init__(self):
+    def __init__(self, judging):
+        self._judging = judging
         self._context = multiprocessing.get_context("fork")
         _warm_up()
         self._start()
 
     def _start(self):
         self._ours, theirs = self._context.Pipe()
-        self._process = self._context.Process(target=_serve, args=(theirs,), daemon=True)
+        self._process = self._context.Process(target=_serve, args=(theirs, self._judging),
+                                              daemon=True)
         self._process.start()
         theirs.close()
 
@@ -182,7 +186,7 @@ def _warm_up():
         seeds.results()
 
 
-def _serve(pipe):
+def _serve(pipe, judging):
     """Judge what the pipe asks for, within the limits."""
     faulthandler.disable()
     pages = int(Path("/proc/self/statm").read_text().split()[0])
@@ -197,4 +201,4 @@ def _serve(pipe):
         spent = resource.getrusage(resource.RUSAGE_SELF)
         resource.setrlimit(resource.RLIMIT_CPU, (
             int(spent.ru_utime + spent.ru_stime) + MOST_SECONDS + 2, resource.RLIM_INFINITY))
-        pipe.send(judge(number, Path(folder)))
+        pipe.send(judging(number, Path(folder)))
