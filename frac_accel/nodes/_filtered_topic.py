@@ -7,15 +7,15 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Temperature
 
-from frac_accel import cdr
 from frac_accel.errors import FracAccelError
+from frac_accel.io import cdr
 from frac_accel.nodes._runtime import (
     INVALID_ENDPOINT,
     NodeError,
     RawSubscription,
     publish_serialized,
 )
-from frac_accel.publisher_tracks import PublisherTracks
+from frac_accel.streaming.publisher_tracks import PublisherTracks
 
 # Filtering one sample costs as much as filtering fifty, so above this rate messages are taken in
 # groups, for so long.

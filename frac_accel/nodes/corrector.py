@@ -11,12 +11,9 @@ from rclpy.qos import QoSCompatibility, qos_check_compatible
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from frac_accel import cdr, correction, health
-from frac_accel.correction.apart import design_apart
-from frac_accel.correction.stream import ON_FAULT
+from frac_accel import streaming
 from frac_accel.errors import FracAccelError
-from frac_accel.live_messages import BlockMessages, SampleMessages
-from frac_accel.live_metrics import Findings, LiveMetrics, Window, evaluate
+from frac_accel.io import cdr
 from frac_accel.model import SensorModel
 from frac_accel.nodes._filtered_topic import (
     ON_TWO_PUBLISHERS,
@@ -33,6 +30,11 @@ from frac_accel.nodes._runtime import (
     normalised,
     run_node,
 )
+from frac_accel.streaming import health
+from frac_accel.streaming.apart import design_apart
+from frac_accel.streaming.live_messages import BlockMessages, SampleMessages
+from frac_accel.streaming.live_metrics import Findings, LiveMetrics, Window, evaluate
+from frac_accel.streaming.stream import ON_FAULT
 
 _PERIOD_S = 1.0
 _REFERENCE_PERIOD_S = 0.1
@@ -176,7 +178,7 @@ class Corrector(FracAccelNode):
     def make_stream(self, model, wishes):
         """Stream of one topic."""
         stated = tuple(self.value("plausible_range"))
-        return correction.Corrector(
+        return streaming.Corrector(
             model, self.value("sample_rate_hz"), noise_std=self.value("noise_std") or None,
             plausible_range=stated if any(stated) else None, on_fault=self.value("on_fault"),
             largest_rate=self.value("largest_rate"), **wishes)

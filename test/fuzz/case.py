@@ -5,7 +5,7 @@ import json
 import numpy as np
 import yaml
 
-from frac_accel.bag import Samples, write_bag
+from frac_accel.io.bag import Samples, write_bag
 
 from . import damage, seeds
 

@@ -8,8 +8,8 @@ import signal
 import numpy as np
 
 from frac_accel import Corrector, SensorModel
-from frac_accel.correction import apart
 from frac_accel.errors import FracAccelError
+from frac_accel.streaming import apart
 
 from . import seeds
 from .case import model_file
