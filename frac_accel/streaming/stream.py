@@ -42,8 +42,8 @@ class Filtered:
     values : ndarray, shape (n, 3)
     variance : ndarray, shape (n, 3)
         Their variance from the noise of the input, the uncertainty of the model's parameters,
-        bridged gaps and what is not known of the motion before the start; NaN where the noise is
-        not known.
+        bridged gaps, what is not known of the motion before the start and the filter's own error;
+        NaN where the noise is not known.
     """
 
     index: np.ndarray
