@@ -65,9 +65,9 @@ bench: setup
 	$(python) -m frac_accel.cli bench --json bench.json
 	$(python) benchmarks
 
-# MINUTES=2 for a shorter one.
+# MINUTES=2 for a shorter one; SOAK="--rate 2000 --restart 8" with publishers that come and go.
 soak: setup
-	$(python) -m frac_accel.bench.soak --minutes $(or $(MINUTES),10) --picture soak.png
+	$(python) -m frac_accel.bench.soak --minutes $(or $(MINUTES),10) --picture soak.png $(SOAK)
 
 # Hours; goes on where it was stopped. BLIND="single --seed-set 1 --first 2" for a part of it.
 blind: export OPENBLAS_NUM_THREADS := 1

@@ -7,6 +7,7 @@ its arrival in the sink: what the node adds, since the filter's own delay is sta
 
 import contextlib
 import dataclasses
+import json
 import os
 import subprocess
 import sys
@@ -131,6 +132,52 @@ def pass_through(command, rate_hz, duration_s, design=None, kind="imu", block=1,
         sink.wait(60)
         sent, (stamps, arrivals) = np.load(sent_file), np.load(seen_file)
     return _passage(sent, stamps, arrivals, rate_hz, block, design, cpu_s, elsewhere)
+
+
+@contextlib.contextmanager
+def node_and_sink(command, rate_hz):
+    """A corrector and its sink, for publishers that come and go.
+
+    Yields
+    ------
+    node : subprocess.Popen
+    start_publisher : callable
+        Starts a publisher of so many samples from a number on; returns its process and the file
+        that will hold the instants [ns] of sending.
+    stop_sink : callable
+        Stamps and instants [ns] of arrival of all that came, and the last values of its
+        diagnostics, dict of str to str.
+    """
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+        environment = _environment()
+        node = stack.enter_context(_process(command, environment, subprocess.DEVNULL))
+        seen_file, sent_file, counters_file = (str(Path(folder) / name) for name in (
+            "seen.npy", "sent.npy", "counters.json"))
+        sink = stack.enter_context(_traffic(environment, "receive", seen_file, "--counters",
+                                            counters_file))
+        _await(sink, command)
+        _tell(sink)
+        past = contextlib.ExitStack()
+        stack.enter_context(past)
+
+        def start_publisher(first, count):
+            past.close()
+            source = past.enter_context(_traffic(
+                environment, "publish", sent_file, "--rate", str(rate_hz), "--count", str(count),
+                "--first", str(first)))
+            _await(source, command)
+            _tell(source)
+            return source, sent_file
+
+        def stop_sink():
+            # the diagnostics come once a second
+            time.sleep(3.0)
+            _tell(sink)
+            sink.wait(60)
+            values = next(iter(json.loads(Path(counters_file).read_text()).values()))
+            return *np.load(seen_file), values
+
+        yield node, start_publisher, stop_sink
 
 
 def _passage(sent, stamps, arrivals, rate_hz, block, design, cpu_s, elsewhere):

@@ -7,14 +7,21 @@ import argparse
 import json
 import sys
 import tempfile
+import time
 
 import numpy as np
 
-from .live import corrector_command, pass_through, write_model
+from . import live, machine
 
 # The first part of the run fills windows and queues, and is no growth.
 _SETTLED = 0.25
 _MOST_GROWTH_MB = 5.0
+
+# Time [s] by the stamps that a publisher is away for: some of it is bridged, some is not.
+_AWAY_S = (1e-3, 1.0)
+# What a message may have come to by the diagnostics' counters, and a sample.
+_FATES = ("samples", "malformed", "lost", "other_publisher", "without_filter")
+_TOLD = ("given", "warm_up", "cut_off", "waiting", "gaps", "filled", "restarts", "late")
 
 
 def main(arguments=None):
@@ -22,29 +29,77 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--rate", type=float, default=5000.0, metavar="HZ")
+    parser.add_argument("--restart", type=float, metavar="S",
+                        help="end the publisher after so long, and start another one")
     parser.add_argument("--picture", default="soak.png", metavar="FILE")
     parser.add_argument("--json", metavar="FILE")
     chosen = parser.parse_args(arguments)
     memory_mb = []
     with tempfile.TemporaryDirectory() as folder:
-        model_file, design = write_model(folder, chosen.rate)
-        passage = pass_through(corrector_command(model_file, chosen.rate), chosen.rate,
-                               60 * chosen.minutes, design, watch=memory_mb.append)
+        model_file, design = live.write_model(folder, chosen.rate)
+        command = live.corrector_command(model_file, chosen.rate)
+        run = _with_restarts if chosen.restart else _in_one_go
+        found, latencies_ms = run(command, chosen, design, memory_mb.append)
     settled = np.array(memory_mb[int(_SETTLED * len(memory_mb)):])
     growth_mb = float(np.median(settled[-len(settled) // 5:])
                       - np.median(settled[:len(settled) // 5 + 1]))
-    result = {"minutes": chosen.minutes, "rate_hz": chosen.rate, "sent": passage.sent,
-              "lost": passage.lost, "memory_mb": float(settled[-1]), "growth_mb": growth_mb,
-              "cpu_us_per_message": passage.cpu_us, "latency_p50_ms": float(passage.p50_ms),
-              "latency_p99_ms": float(passage.p99_ms), "latency_max_ms": float(passage.max_ms),
-              "cores_busy_elsewhere": passage.busy_elsewhere}
+    p50, p99, most = np.percentile(latencies_ms, (50, 99, 100))
+    result = {"minutes": chosen.minutes, "rate_hz": chosen.rate, **found,
+              "memory_mb": float(settled[-1]), "growth_mb": growth_mb,
+              "latency_p50_ms": float(p50), "latency_p99_ms": float(p99),
+              "latency_max_ms": float(most)}
     for name, value in result.items():
-        print(f"{name:22} {value:.6g}")
-    _draw(chosen.picture, result, memory_mb, passage.latencies_ms)
+        print(f"{name:22} {value:.10g}")
+    _draw(chosen.picture, result, memory_mb, latencies_ms)
     if chosen.json:
         with open(chosen.json, "w", encoding="utf-8") as stream:
             json.dump(result, stream, indent=1)
-    return 1 if passage.lost or growth_mb > _MOST_GROWTH_MB else 0
+    lost = any(result.get(name) for name in ("lost", "uncounted", "undelivered"))
+    return 1 if lost or growth_mb > _MOST_GROWTH_MB else 0
+
+
+def _in_one_go(command, chosen, design, watch):
+    passage = live.pass_through(command, chosen.rate, 60 * chosen.minutes, design, watch=watch)
+    return {"sent": passage.sent, "lost": passage.lost, "cpu_us_per_message": passage.cpu_us,
+            "cores_busy_elsewhere": passage.busy_elsewhere}, passage.latencies_ms
+
+
+def _with_restarts(command, chosen, design, watch):
+    """What came of messages whose publisher ends again and again.
+
+    Each publisher is a process of its own. The stamps go on where the last one ended, after a
+    random time within `_AWAY_S`.
+    """
+    random = np.random.default_rng(0)
+    count, first, publishers, sent_at = int(chosen.restart * chosen.rate), 0, 0, []
+    with live.node_and_sink(command, chosen.rate) as (node, start_publisher, stop_sink):
+        cpu_s = machine.cpu_time_s(node.pid)
+        end = time.monotonic() + 60 * chosen.minutes
+        while time.monotonic() < end:
+            source, sent_file = start_publisher(first, count)
+            while source.poll() is None:
+                time.sleep(1.0)
+                watch(machine.memory_mb(node.pid))
+            instants = np.load(sent_file)
+            sent_at.append(np.stack([np.arange(first, first + count), instants]))
+            first += count + int(chosen.rate * np.exp(random.uniform(*np.log(_AWAY_S))))
+            publishers += 1
+        cpu_s = machine.cpu_time_s(node.pid) - cpu_s
+        stamps, arrivals, counters = stop_sink()
+    numbers, instants = np.concatenate(sent_at, axis=1)
+    index = np.round((stamps + design.sensor_delay_ns - live.START_NS) * 1e-9 * chosen.rate)
+    at = np.searchsorted(numbers, index.astype(np.int64) + design.delay_samples)
+    # those after which a publisher ended were given out when the next one came
+    known = at < len(numbers)
+    known[known] &= numbers[at[known]] == index[known] + design.delay_samples
+    counted = {name: int(counters[name]) for name in (*_FATES, *_TOLD)}
+    uncounted = len(numbers) - sum(counted[name] for name in _FATES)
+    undelivered = int(counters["published"]) - len(stamps)
+    return {"publishers": publishers, "sent": len(numbers),
+            "uncounted": uncounted,
+            "undelivered": undelivered, **counted,
+            "cpu_us_per_message": 1e6 * cpu_s / len(numbers)}, (
+                1e-6 * (arrivals[known] - instants[at[known]]))
 
 
 def _draw(path, result, memory_mb, latencies_ms):

@@ -13,6 +13,8 @@ from ._common import require_report
 
 _LARGEST = 64 * 2**20
 """Bytes of a result."""
+_NOT_A_RESULT = LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError
+"""What drawing a page of anything else ends in."""
 
 
 def add_arguments(parser):
@@ -28,9 +30,13 @@ def run(arguments):
     data = _read(arguments.result)
     try:
         page = _page(data)
+        page.write(arguments.output)
     except FracAccelError as error:
         raise FracAccelError(f"{arguments.result}: {error}") from None
-    page.write(arguments.output)
+    except _NOT_A_RESULT as error:
+        raise FracAccelError(
+            f"{arguments.result}: no complete result, expected what frac_accel diagnose or identify "
+            f"--json writes ({type(error).__name__})") from None
     say(f"{arguments.output}: written")
 
 

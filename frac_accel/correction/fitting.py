@@ -43,6 +43,8 @@ class DesignedFilter:
         Worst phase error in the band [degree], its delay taken out.
     noise_gain : float
         Standard deviation of the output per standard deviation of white input noise.
+    rms_error : float
+        Relative error in the band (complex, RMS over frequency).
     """
 
     filter: ParallelFilter
@@ -52,6 +54,7 @@ class DesignedFilter:
     amplitude_error: float
     phase_error_deg: float
     noise_gain: float
+    rms_error: float
 
 
 class FilterProblem:
@@ -165,7 +168,9 @@ class FilterProblem:
             delay_s=(shift + self.lead) / self.rate,
             amplitude_error=float(np.max(np.abs(np.abs(response) - right_size))),
             phase_error_deg=float(np.degrees(np.max(np.abs(phase[right_size > 0.999])))),
-            noise_gain=result.noise_gain)
+            noise_gain=result.noise_gain,
+            rms_error=float(np.sqrt(np.average(np.abs(response - right_size)**2,
+                                               weights=np.gradient(self.check)))))
 
     def _unit(self, target):
         """What errors are relative to: the target, made no smaller than the floor."""

@@ -11,6 +11,8 @@ from .evidence import Evidence
 from .gain import Gain
 from .judgement import Diagnosis, Finding
 
+_MOST_WORDS = 200
+
 
 def diagnosis_from(data):
     """`Diagnosis` of what `Diagnosis.as_dict` gave; null stands for numbers that are none.
@@ -29,7 +31,7 @@ def diagnosis_from(data):
         raise
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise FracAccelError("no complete result of a diagnosis: "
-                             f"{type(error).__name__}: {error}") from None
+                             f"{type(error).__name__}: {str(error)[:_MOST_WORDS]}") from None
 
 
 def _diagnosis(data):

@@ -5,12 +5,14 @@ write what they saw to a file.
 """
 
 import argparse
+import json
 import sys
 import threading
 import time
 
 import numpy as np
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -19,19 +21,21 @@ from sensor_msgs.msg import Imu, PointCloud2
 
 from ..io import cdr
 from ..io.samples import Samples
-from ._bench_stamps import stamps_ns
+from ._bench_stamps import START_NS
 from ._runtime import RawSubscription
 
 DEPTH = 20_000
 QOS = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)
 TOPICS = {"imu": ("imu/data_raw", "imu/data", Imu),
           "blocks": ("accel/blocks_raw", "accel/blocks", PointCloud2)}
+# Messages that a sink keeps as they came; a run of an hour would fill the memory with them.
+_KEPT = 20_000
 
 
-def encoded(kind, count, rate_hz, block):
-    """Serialised messages of `count` samples at `rate_hz`, `block` samples in each."""
+def encoded(kind, first, count, rate_hz, block):
+    """Serialised messages of the samples from `first` on at `rate_hz`, `block` samples in each."""
     values = np.random.default_rng(0).standard_normal((count, 3))
-    stamps = stamps_ns(count, rate_hz)
+    stamps = START_NS + np.round(np.arange(first, first + count) / rate_hz * 1e9).astype(np.int64)
     if kind == "imu":
         return cdr.encode_samples(cdr.IMU, Samples.of(stamps, values, np.full((count, 3), 1e-4)))
     return [cdr.encode_point_cloud(Samples.of(stamps[i:i + block], values[i:i + block]))
@@ -42,7 +46,8 @@ def publish(node, arguments):
     """Publish at a steady rate; the instants [ns] of sending go to the file."""
     topic, _, message_class = TOPICS[arguments.kind]
     publisher = node.create_publisher(message_class, topic, QOS)
-    messages = encoded(arguments.kind, arguments.count, arguments.rate, arguments.block)
+    messages = encoded(arguments.kind, arguments.first, arguments.count, arguments.rate,
+                       arguments.block)
     rate_hz = arguments.rate / arguments.block
     if not arguments.alone:
         _wait(lambda: publisher.get_subscription_count())
@@ -62,8 +67,13 @@ def publish(node, arguments):
 def receive(node, arguments):
     """Take all until a second line comes; stamps and instants [ns] of arrival go to the file."""
     _, topic, message_class = TOPICS[arguments.kind]
-    batches = []
-    RawSubscription(node, message_class, topic, batches.append, QOS)
+    arrived = _Arrived(arguments.kind)
+    RawSubscription(node, message_class, topic, arrived.add, QOS)
+    statuses = {}
+    if arguments.counters:
+        node.create_subscription(DiagnosticArray, "/diagnostics", lambda array: statuses.update(
+            {status.name: {entry.key: entry.value for entry in status.values}
+             for status in array.status}), 10)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     stop = threading.Event()
@@ -84,15 +94,38 @@ def receive(node, arguments):
     finally:
         stop.set()
         thread.join()
-    messages = [message for batch in batches for message in batch]
-    arrivals = np.array([message.received_time_ns for message in messages], np.int64)
-    if arguments.kind == "imu":
-        stamps = cdr.read_samples(cdr.IMU, [message.data for message in messages]).stamps_ns
-    else:
-        parts = [cdr.read_point_cloud(message.data).stamps_ns for message in messages]
-        stamps = np.concatenate([np.empty(0, np.int64), *parts])
-        arrivals = np.repeat(arrivals, [len(part) for part in parts])
-    np.save(arguments.file, np.stack([stamps, arrivals]))
+    np.save(arguments.file, arrived.all())
+    if arguments.counters:
+        with open(arguments.counters, "w", encoding="utf-8") as stream:
+            json.dump(statuses, stream)
+
+
+class _Arrived:
+    """Stamps and instants of arrival [ns] of messages."""
+
+    def __init__(self, kind):
+        self._kind, self._messages, self._parts = kind, [], [np.empty((2, 0), np.int64)]
+
+    def add(self, batch):
+        self._messages += batch
+        if len(self._messages) >= _KEPT:
+            self._read()
+
+    def all(self):
+        """Shape (2, n)."""
+        self._read()
+        return np.concatenate(self._parts, axis=1)
+
+    def _read(self):
+        messages, self._messages = self._messages, []
+        arrivals = np.array([message.received_time_ns for message in messages], np.int64)
+        if self._kind == "imu":
+            stamps = cdr.read_samples(cdr.IMU, [message.data for message in messages]).stamps_ns
+        else:
+            parts = [cdr.read_point_cloud(message.data).stamps_ns for message in messages]
+            stamps = np.concatenate([np.empty(0, np.int64), *parts])
+            arrivals = np.repeat(arrivals, [len(part) for part in parts])
+        self._parts.append(np.stack([stamps, arrivals]))
 
 
 def _ready():
@@ -116,6 +149,8 @@ def main():
     parser.add_argument("--kind", default="imu", choices=TOPICS)
     parser.add_argument("--rate", type=float, default=1000.0)
     parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--first", type=int, default=0, help="number of the first sample")
+    parser.add_argument("--counters", help="file for the last diagnostics")
     parser.add_argument("--block", type=int, default=1)
     parser.add_argument("--alone", action="store_true", help="do not wait for the node")
     arguments = parser.parse_args()

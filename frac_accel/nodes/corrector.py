@@ -342,6 +342,7 @@ class _Channel:
             stale_s=stale_s, stale_after_s=self._node.value("stale_after_s"),
             faults=topic.stream.faults if topic.rate_hz else ("",) * 3,
             on_fault=self._node.value("on_fault"),
+            learns_range=bool(topic.rate_hz) and topic.stream.learns_range,
             other_publishers=tuple(p.node for p in publishers if p not in self._alone),
             frames=(topic.tracks.first_frame, topic.tracks.other_frame),
             takes_first=self._node.value("on_two_publishers") == "first",

@@ -7,9 +7,6 @@ import numpy as np
 
 from .linear_filter import run_filter, run_sections
 
-# Samples over which `unknown_history` is looked up once, and how many such at a time.
-_HISTORY_STEP = 8
-_HISTORY_PIECE = 128
 # Error of a filter in series, of its response, from which on it is not used.
 _ROUNDING = 1e-6
 # Poles closer to one than this do not run in series with others.
@@ -71,15 +68,6 @@ class ParallelFilter:
         """
         powers = self.poles[:, None] ** np.arange(len(self.taps))
         return self.taps + (self.residues[:, None] * powers).sum(axis=0).real
-
-    def unknown_history(self, count):
-        """Weight of what came before the filter's start, `count` samples ago (array).
-
-        Bound of the output's part that a unit history would still make after that many samples;
-        the taps have then been filled.
-        """
-        decay = np.abs(self.poles) ** (np.asarray(count) - self.lead)[..., None]
-        return (np.abs(self.residues) / np.abs(1 - self.poles) * decay).sum(axis=-1)
 
     @functools.cached_property
     def chains(self):
@@ -147,34 +135,6 @@ class ParallelFilter:
         return taps, [chain, *chains]
 
 
-class UnknownHistory:
-    """Square of `ParallelFilter.unknown_history` from sample to sample.
-
-    It is looked up every few samples, in pieces that do not depend on how the samples are split.
-
-    Parameters
-    ----------
-    parallel_filter : ParallelFilter
-    first : int
-        Samples since the start, at the first that is asked for.
-    """
-
-    def __init__(self, parallel_filter, first):
-        self._filter = parallel_filter
-        self._next = first
-        self._left = np.empty(0)
-
-    def squared(self, count):
-        """At the next `count` samples."""
-        while len(self._left) < count:
-            at = self._next + _HISTORY_STEP * np.arange(_HISTORY_PIECE)
-            self._next += _HISTORY_STEP * _HISTORY_PIECE
-            weight = np.repeat(self._filter.unknown_history(at)**2, _HISTORY_STEP)
-            self._left = np.concatenate([self._left, weight])
-        result, self._left = self._left[:count], self._left[count:]
-        return result
-
-
 def _real_section(pole, residue):
     """Chain of one real pole, whose coefficient is not rounded."""
     return np.array([[residue, 0.0, 0.0, 1.0, -pole, 0.0]])
@@ -225,6 +185,32 @@ class FilterState:
         for chain, state in self._chains:
             output += run_sections(chain, values, state)
         return output
+
+
+class MotionPower:
+    """Power of signals about their means, both over the last samples, in blocks of any length.
+
+    Parameters
+    ----------
+    level : ndarray, shape (k,)
+        Of each signal before the first sample.
+    samples : int
+        Time constant of both means.
+    """
+
+    def __init__(self, level, samples):
+        share = 1 / (samples + 1)
+        self._mean = np.array([share, 0.0]), np.array([1.0, share - 1.0])
+        self._level_state = np.outer(level, steady_state(*self._mean))
+        self._power_state = np.zeros((len(level), 1))
+
+    def process(self, values):
+        """Shape (k, n) in and out."""
+        level, self._level_state = run_filter(*self._mean, values, self._level_state)
+        apart = values - level
+        apart *= apart
+        power, self._power_state = run_filter(*self._mean, apart, self._power_state)
+        return power
 
 
 def _steady_chain(chain, level):

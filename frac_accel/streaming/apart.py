@@ -64,7 +64,8 @@ def design_apart(model_file, rates_hz, wishes, deadline_s):
     return result
 
 
-def _attempt(model_file, rates_hz, wishes):
+def attempt(model_file, rates_hz, wishes):
+    """The same in this process, for as long as it takes and with whatever exception."""
     from ..model import SensorModel
     model, model_hash = SensorModel.load_with_hash(model_file)
     return model, model_hash, {rate: _sound_design(model, rate, wishes) for rate in rates_hz}
@@ -94,7 +95,7 @@ def main():
     os.dup2(2, 1)
     request = pickle.loads(sys.stdin.buffer.read())
     try:
-        answer = pickle.dumps(("", _attempt(*request)))
+        answer = pickle.dumps(("", attempt(*request)))
     except FracAccelError as error:
         answer = pickle.dumps((str(error), None))
     except Exception as error:  # whatever it is, it is a refusal

@@ -4,6 +4,7 @@ import dataclasses
 
 from ..model import AXES
 from .live_metrics import Findings
+from .monitors import NOT_CONNECTED
 from .timing import RATE_SAMPLES
 
 OK, WARN, ERROR = range(3)
@@ -22,6 +23,7 @@ _DROPPED = {
     "other_publisher": "came from another publisher",
     "without_rate": "were too far apart to tell the sampling rate: most samples are lost",
 }
+_SHORT_SHOCKS = " (shocks of one or two samples look the same: state plausible_range to keep them)"
 _FAULTS = {"dead": "says nothing but zero", "stuck": "is stuck at one value",
            "saturated": "is at the end of its range", "held": "repeats its samples",
            "too fast": "changes faster than stated"}
@@ -84,6 +86,8 @@ class Situation:
         Frame of the publisher that is corrected, and of the other one.
     takes_first : bool
         Whether, of two publishers, the first is corrected.
+    learns_range : bool
+        Whether what can be true is taken from the record, as no range is stated.
     load : float
         Share of one core that the process uses.
     findings : Findings
@@ -110,6 +114,7 @@ class Situation:
     other_publishers: tuple = ()
     frames: tuple = ("", "")
     takes_first: bool = True
+    learns_range: bool = False
     load: float = 0.0
     findings: Findings = dataclasses.field(default_factory=Findings)
     reference_silent_s: float | None = None
@@ -214,7 +219,7 @@ def _grave(s):
     done = {"covariance": "its covariance says so", "drop": "no sample is given",
             "report": "its samples are given as ever"}[s.on_fault]
     grave = [f"axis {axis} {_FAULTS[fault]}: {done}"
-             for axis, fault in zip(AXES, s.faults) if fault]
+             for axis, fault in zip(AXES, s.faults) if fault not in ("", NOT_CONNECTED)]
     if s.changes.get("other_publisher") and s.takes_first:
         grave.append(f"{_two_publishers(s)}, whose {s.changes['other_publisher']} messages were "
                      "dropped")
@@ -223,10 +228,14 @@ def _grave(s):
 
 def _troubles(s):
     changes = s.changes
-    troubles = []
+    done = {"covariance": "its covariance says so", "drop": "its covariance says so",
+            "report": "its samples are given as ever"}[s.on_fault]
+    troubles = [f"axis {axis} has never said anything but zero and counts as not connected: {done}"
+                for axis, fault in zip(AXES, s.faults) if fault == NOT_CONNECTED]
     for name, text in _DROPPED.items():
         if changes.get(name) and name != "other_publisher":
-            troubles.append(f"{changes[name]} samples {text} and were dropped")
+            troubles.append(f"{changes[name]} samples {text} and were dropped"
+                            + (_SHORT_SHOCKS if name == "implausible" and s.learns_range else ""))
     if changes.get("gaps"):
         troubles.append(f"{changes['gaps']} gaps were bridged over {changes.get('filled', 0)} "
                         "samples")

@@ -8,6 +8,8 @@ that makes it, so what is decided depends on the samples and their order alone. 
   same for seconds at rest, so it counts as *stuck* (*dead* at exactly zero) only after
   `STUCK_S` while another axis moves by `MOVES` of its own smallest steps or more; after `COARSE_S`
   where the axis is used to repeating itself; and after `LONG_S` if nothing moves at all;
+* *not connected*: dead, and never anything but zero since the start, as an axis that a sensor
+  of one or two axes does not have;
 * *saturated*: more than half of a frame's samples at the limits of the model, twice in a row;
 * *held*: more than `REPEATED` of the samples repeat the one before while the others jump by
   `JUMPS` of its smallest steps: the messages come faster than the sensor samples;
@@ -31,7 +33,8 @@ CLEAR_FRAMES = 10
 _NOISE_SHARE, _OTHER_SHARE = 1e-3, 1e-6
 # Share of repetitions from which on an axis is used to them, and how slowly that is learnt.
 _USED_TO, _LEARNS = 0.1, 0.05
-FAULTS = ("", "dead", "stuck", "saturated", "held", "too fast")
+NOT_CONNECTED = "not connected"
+FAULTS = ("", "dead", "stuck", "saturated", "held", "too fast", NOT_CONNECTED)
 
 
 class AxisMonitors:
@@ -60,6 +63,7 @@ class AxisMonitors:
         self._largest_step = largest_rate / sampling_rate_hz or np.inf
         self._part, self._count = [], 0
         self._last = None
+        self._only_zero = np.ones(3, bool)
         self._lattice = np.full(3, np.inf)
         # coarse until it has shown that it is not
         self._repeats = np.ones(3)
@@ -108,25 +112,31 @@ class AxisMonitors:
         if len(frame) < 2:
             return
         before = frame[:1] if self._last is None else self._last[None]
-        steps = np.abs(np.diff(np.concatenate([before, frame]), axis=0))
-        self._last = frame[-1]
-        moved = np.where(steps > 0, steps, np.inf).min(axis=0)
+        # axis by axis in memory, as numpy is ten times slower along the other way
+        frame = np.ascontiguousarray(np.concatenate([before, frame]).T)
+        steps = np.abs(np.diff(frame, axis=1))
+        frame = frame[:, 1:]
+        self._last = frame[:, -1]
+        moved = np.where(steps > 0, steps, np.inf).min(axis=1)
         self._lattice = np.minimum(self._lattice, moved)
-        span = np.ptp(frame, axis=0)
-        repeated = np.mean(steps == 0, axis=0)
+        span = np.ptp(frame, axis=1)
+        repeated = np.mean(steps == 0, axis=1)
         found = np.zeros(3, int)
         self._find_still(frame, span, repeated, found)
-        at_limit = np.mean((frame <= self._limits[0]) | (frame >= self._limits[1]), axis=0) > 0.5
+        self._only_zero &= (frame == 0).all(axis=1)
+        found[(found == 1) & self._only_zero] = FAULTS.index(NOT_CONNECTED)
+        low, high = (limit[:, None] for limit in self._limits)
+        at_limit = np.mean((frame <= low) | (frame >= high), axis=1) > 0.5
         self._at_limit = np.where(at_limit, self._at_limit + 1, 0)
         found[self._at_limit >= 2] = 3
         with np.errstate(invalid="ignore"):
-            jumps = np.divide(steps.sum(axis=0), np.sum(steps > 0, axis=0),
-                              out=np.zeros(3), where=(steps > 0).any(axis=0))
+            jumps = np.divide(steps.sum(axis=1), np.sum(steps > 0, axis=1),
+                              out=np.zeros(3), where=(steps > 0).any(axis=1))
             held = ((repeated > REPEATED) & (jumps > JUMPS * self._lattice)
                     & (span > MOVES * self._lattice))
         self._held = np.where(held, self._held + 1, 0)
         found[(self._held >= HELD_FRAMES) & (found == 0)] = 4
-        found[(steps > self._largest_step).any(axis=0) & (found == 0)] = 5
+        found[(steps > self._largest_step).any(axis=1) & (found == 0)] = 5
         self._since = np.where(found > 0, 0, self._since + 1)
         self._code = np.where(found > 0, found,
                               np.where(self._since >= CLEAR_FRAMES, 0, self._code))
@@ -137,11 +147,11 @@ class AxisMonitors:
     def _find_still(self, frame, span, repeated, found):
         others = np.array([max(span[i - 1], span[i - 2]) for i in range(3)])
         tolerance = np.maximum(_NOISE_SHARE * self._noise_std, _OTHER_SHARE * others)
-        same = np.abs(frame[0] - self._still_at) <= tolerance
+        same = np.abs(frame[:, 0] - self._still_at) <= tolerance
         still = (span <= tolerance) & (same | np.isnan(self._still_at))
         self._still_at = np.where(span <= tolerance, np.where(still, self._still_at, np.nan),
                                   np.nan)
-        self._still_at = np.where(np.isnan(self._still_at) & (span <= tolerance), frame[0],
+        self._still_at = np.where(np.isnan(self._still_at) & (span <= tolerance), frame[:, 0],
                                   self._still_at)
         self._still_s = np.where(still, self._still_s + self._frame_s, 0.0)
         moving = span >= MOVES * self._lattice
@@ -153,4 +163,4 @@ class AxisMonitors:
                                  self._repeats + _LEARNS * (repeated - self._repeats))
         needed = np.where(used_to, COARSE_S, STUCK_S) * (1 - 1e-9)
         stuck = (self._moved_s >= needed) | (self._still_s >= LONG_S)
-        found[stuck] = np.where(np.abs(frame[-1]) <= tolerance, 1, 2)[stuck]
+        found[stuck] = np.where(np.abs(frame[:, -1]) <= tolerance, 1, 2)[stuck]

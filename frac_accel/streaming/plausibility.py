@@ -19,6 +19,7 @@ spread is the first range.
 """
 
 import collections
+from operator import gt, le
 
 import numpy as np
 
@@ -53,6 +54,8 @@ class Plausibility:
     ----------
     held : tuple of ndarray
         Index, stamps, values and variance of the samples that are not yet decided on.
+    learns : bool
+        Whether the record itself says what can be true.
     """
 
     def __init__(self, low, high, floor):
@@ -67,8 +70,9 @@ class Plausibility:
         self._low, self._high = low, high
         # sizes below it are within the range on every axis: quick to see
         self._symmetric = min(-low.max(), high.min())
-        self._learns = floor is not None
+        self.learns = floor is not None
         self._floor = floor
+        self._look_quickly()
 
     @property
     def waiting(self):
@@ -101,11 +105,15 @@ class Plausibility:
             return *samples, None, None
         size = np.abs(values)
         largest = size.max(axis=0)
+        sizes = largest.tolist()
+        if self._quick and all(map(le, sizes, self._quick[0])):
+            self._accept(values, largest, sizes)
+            return *samples, None, None
         plausible = finite = None
         if not largest.max() < self._symmetric:
             finite = np.isfinite(size).all(axis=1)
             plausible = finite & ((values >= self._low) & (values <= self._high)).all(axis=1)
-        if not self._learns:
+        if not self.learns:
             return *samples, plausible, finite
         if self._peak is None:
             good = values[:HOLD] if plausible is None else values[:HOLD][plausible[:HOLD]]
@@ -113,9 +121,6 @@ class Plausibility:
                 self.held = samples
                 return *(part[:0] for part in samples), None, None
             self._learn(good[:LEARN])
-        if plausible is None and not (largest > self._range()).any():
-            self._accept(values, largest)
-            return *samples, None, None
         if plausible is None:
             plausible = np.ones(len(index), bool)
         decided = self._look(values, size, plausible, is_end)
@@ -127,6 +132,13 @@ class Plausibility:
     def _range(self, wider=WIDER):
         return np.maximum(wider * self._peak, self._floor)
 
+    def _look_quickly(self):
+        """Sizes by axis up to which nothing is wrong, and the largest so far, as plain lists."""
+        self._quick = None
+        if self.learns and self._peak is not None:
+            within = np.minimum(self._range(), np.nextafter(self._symmetric, 0.0))
+            self._quick = within.tolist(), self._peak.tolist()
+
     def _learn(self, first):
         """First range, from the first samples but for their largest."""
         self._peak = self._first_step = np.zeros(3)
@@ -135,9 +147,12 @@ class Plausibility:
             # each sample that stands alone makes two steps
             steps = np.sort(np.abs(np.diff(first, axis=0)), axis=0)
             self._first_step = _FIRST * steps[-2 * _LEFT_OUT - 1]
+        self._look_quickly()
 
-    def _accept(self, values, largest):
-        self._peak = np.maximum(self._peak, largest)
+    def _accept(self, values, largest, sizes):
+        if any(map(gt, sizes, self._quick[1])):
+            self._peak = np.maximum(self._peak, largest)
+            self._look_quickly()
         self._tail.append(values[-TAIL - 1:])
         self._tail_length += len(self._tail[-1])
         while self._tail_length - len(self._tail[0]) > TAIL:
@@ -183,7 +198,8 @@ class Plausibility:
     def _accept_plausible(self, values, plausible, start, stop):
         found = values[start:stop][plausible[start:stop]]
         if len(found):
-            self._accept(found, np.abs(found).max(axis=0))
+            largest = np.abs(found).max(axis=0)
+            self._accept(found, largest, largest.tolist())
 
 
 def stated_range(plausible_range, limits, gain):

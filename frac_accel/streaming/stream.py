@@ -9,10 +9,11 @@ from ..correction.parameter_uncertainty import ParameterUncertaintyState
 from ..correction.static_terms import StaticTermsState
 from ..errors import DesignError, FracAccelError
 from ..model.effects import Circumstances
-from ..signals.parallel_filter import FilterState, ParallelFilter, UnknownHistory
+from ..signals.parallel_filter import FilterState, MotionPower, ParallelFilter
 from ..signals.sample_rate import estimate_rate
 from .bridging import BridgeEnsemble
-from .monitors import AxisMonitors
+from .history import UnknownHistory
+from .monitors import FAULTS, NOT_CONNECTED, AxisMonitors
 from .plausibility import Plausibility, stated_range
 from .temperature import HeldTemperature
 from .timing import LARGEST, RATE_SAMPLES, SampleClock, tells_rate
@@ -41,8 +42,8 @@ class Filtered:
     values : ndarray, shape (n, 3)
     variance : ndarray, shape (n, 3)
         Their variance from the noise of the input, the uncertainty of the model's parameters,
-        bridged gaps and what is not known of the motion before the start; NaN where the noise is
-        not known.
+        bridged gaps, what is not known of the motion before the start and the filter's own error;
+        NaN where the noise is not known.
     """
 
     index: np.ndarray
@@ -72,7 +73,8 @@ class Stream:
         Lowest and highest value that can be true; default: see `plausibility`.
     on_fault : {"covariance", "drop", "report"}
         What happens to the output while an axis is faulty (`monitors`): its variance becomes
-        `DISTRUSTED`, nothing is given out, or nothing happens.
+        `DISTRUSTED`, nothing is given out, or nothing happens. An axis that is not connected has
+        the variance, but withholds nothing of the others.
     largest_rate : float
         Largest rate of change [input units/s] that is no fault; 0: any.
     **wishes
@@ -139,6 +141,11 @@ class Stream:
     def faults(self):
         """What is wrong with each axis now, tuple of str: see `monitors.FAULTS`."""
         return self._monitors.faults if self._clock else ("",) * 3
+
+    @property
+    def learns_range(self):
+        """Whether what can be true is taken from the record, as no range is stated."""
+        return self._clock is not None and self._plausibility.learns
 
     @property
     def counters(self):
@@ -504,13 +511,13 @@ class Stream:
             # behind a high-pass every steady motion leaves the output at rest
             level = np.zeros(len(columns)) if design.band_hz[0] else columns.mean(axis=1)
             state = FilterState(design.filter, level)
-            state.process(columns)
+            power = MotionPower(level * design.filter.static_gain, len(values))
+            power.process(state.process(columns))
             head = np.r_[np.zeros(design.filter.lead), np.square(design.filter.impulse_head)]
             noise = FilterState(ParallelFilter(head, np.empty(0), np.empty(0)),
                                 np.zeros(len(columns)))
             noise.process(variance[:, rows].T)
             later = max(design.noise_gain**2 - head.sum(), 0.0)
-            power = np.mean((columns - level[:, None])**2, axis=1)
             static, parts = None, ()
             if terms:
                 static = StaticTermsState(terms, columns.mean(axis=1) * (not terms.is_coupled),
@@ -521,12 +528,14 @@ class Stream:
             if uncertainty:
                 doubt = ParameterUncertaintyState(uncertainty, columns.mean(axis=1))
                 doubt.process(columns, parts)
-            history = (UnknownHistory(design.filter, len(values) + 1)
-                       if len(design.filter.poles) else None)
+            history = None
+            if len(design.filter.poles):
+                history = UnknownHistory(design.filter, level, design.band_hz[0] > 0)
+                history.process(columns)
             ensemble = BridgeEnsemble(design.filter, len(columns))
             ensemble.process(len(values), _rows_of(bridges, rows))
-            self._states.append((rows, state, noise, later, history, power[:, None], static,
-                                 doubt, ensemble))
+            self._states.append((rows, state, design.rms_error**2, power, noise, later, history,
+                                 static, doubt, ensemble))
         # the oldest of the waiting will have been passed over before the first output
         skipped = len(values) - self.design.delay_samples
         fresh = self._waiting_index[:skipped]
@@ -538,14 +547,18 @@ class Stream:
         count = len(values)
         result, spread = np.empty((3, count)), np.empty((3, count))
         values, variance = np.ascontiguousarray(values.T), np.ascontiguousarray(variance.T)
-        for rows, state, noise, later, history, power, static, doubt, ensemble in self._states:
+        for (rows, state, error, power, noise, later, history, static, doubt,
+             ensemble) in self._states:
             own, known = values[rows], variance[rows]
             corrected = state.process(own)
             total = noise.process(known)
             if later:
                 total += later * known
+            total += error * power.process(corrected)
             if history:
-                total += power * history.squared(count)
+                added, more = history.process(own)
+                corrected += added
+                total += more
             gaps = ensemble.process(count, _rows_of(bridges, rows))
             if gaps is not None:
                 total += gaps
@@ -574,18 +587,21 @@ class Stream:
         codes = (self._monitors.codes(index + self.design.delay_samples)
                  if len(index) and self._on_fault != "report" else None)
         if codes is not None and codes.any():
-            filtered = self._distrust(codes > 0, filtered)
+            filtered = self._distrust(codes, filtered)
         self._totals["given"] += len(filtered)
         return filtered
 
-    def _distrust(self, is_faulty, filtered):
+    def _distrust(self, codes, filtered):
         """`Filtered` of which some axes are faulty, as `on_fault` wants it."""
-        rows = is_faulty.any(axis=1)
+        rows = ((codes > 0) & (codes != FAULTS.index(NOT_CONNECTED))).any(axis=1)
         if self._on_fault == "drop":
             self._totals["faulty"] += int(rows.sum())
-            return Filtered(*(getattr(filtered, field.name)[~rows]
-                              for field in dataclasses.fields(Filtered)))
+            filtered = Filtered(*(getattr(filtered, field.name)[~rows]
+                                  for field in dataclasses.fields(Filtered)))
+            codes, rows = codes[~rows], rows[~rows]
         self._totals["distrusted"] += int(rows.sum())
+        is_faulty = codes > 0
+        rows = is_faulty.any(axis=1)
         # a message cannot say that one axis is bad and another's noise unknown
         unknown = rows[:, None] & np.isnan(filtered.variance)
         return dataclasses.replace(filtered, variance=np.where(is_faulty | unknown, DISTRUSTED,

@@ -7,7 +7,7 @@ import secrets
 import sys
 from pathlib import Path
 
-from . import runner
+from . import live, runner
 
 
 def main():
@@ -17,6 +17,8 @@ def main():
     parser.add_argument("--count", type=int, help="how many cases (default: until stopped)")
     parser.add_argument("--keep", default="fuzz_found", help="folder for the inputs of cases that "
                         "go wrong (default: %(default)s)")
+    parser.add_argument("--live", action="store_true", help="models for a corrector at work, "
+                        "instead of inputs for commands")
     chosen = parser.parse_args()
     first = secrets.randbits(40) if chosen.first is None else chosen.first
     numbers = itertools.count(first) if chosen.count is None else (
@@ -32,7 +34,8 @@ def main():
 
     found = None
     try:
-        found = runner.run(numbers, Path(chosen.keep), told)
+        found = runner.run(numbers, Path(chosen.keep), told,
+                           live.judge if chosen.live else runner.judge)
     except KeyboardInterrupt:
         pass
     print(f"{counts.total()} cases from {first} on")

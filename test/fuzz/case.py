@@ -1,5 +1,7 @@
 """One case: inputs in a folder, of which one is damaged, and the command that gets them."""
 
+import json
+
 import numpy as np
 import yaml
 
@@ -10,8 +12,9 @@ from . import damage, seeds
 # How often each command has its turn; those without an entry read no such input, with the reason.
 SHARES = {"correct": 0.3, "simulate": 0.2, "validate": 0.2, "identify": 0.15, "diagnose": 0.1,
           "budget": 0.05}
+# Those whose number this divides.
+BY_NUMBER = {"report": 10}
 WITHOUT = {"paper": "its study takes minutes; it reads bags as identify and diagnose do",
-           "report": "it reads results only, which a test of its own damages",
            "bench": "it reads no file"}
 DAMAGES = {"bag octets": 0.2, "bag records": 0.25, "bag samples": 0.2, "metadata": 0.08,
            "model tree": 0.17, "model text": 0.07, "nothing": 0.03}
@@ -30,12 +33,14 @@ def make(number, folder):
         Which damage it is.
     """
     rng = np.random.default_rng(number)
+    if number % BY_NUMBER["report"] == 0:
+        return _report(folder, rng)
     verb = _choice(SHARES, rng)
     what = _choice(DAMAGES, rng)
     if verb == "identify" and what.startswith("model"):
         what = "bag samples"
     bag = _bag(what, folder, rng)
-    (folder / "m.yaml").write_bytes(_model(what, rng))
+    (folder / "m.yaml").write_bytes(model_file(what, rng))
     arguments, outputs = [verb, str(bag)], []
     if verb != "identify" and not (verb in ("diagnose", "budget") and rng.random() < 0.3
                                    and not what.startswith("model")):
@@ -60,6 +65,20 @@ def make(number, folder):
     if verb in ("identify", "validate", "diagnose") and rng.random() < 0.3:
         arguments += ["--axis", str(rng.choice(list("xyz")))]
     return arguments, outputs, f"{verb}, {what}"
+
+
+def _report(folder, rng):
+    results = seeds.results()
+    data = results[rng.integers(len(results))]
+    source, page = folder / "r.json", folder / "r.html"
+    if rng.random() < 0.7:
+        what = "result tree"
+        content = json.dumps(damage.branch(data, rng)).encode()
+    else:
+        what = "result text"
+        content = damage.text(json.dumps(data, indent=1), rng)
+    source.write_bytes(content)
+    return ["report", str(source), "-o", str(page)], [page], f"report, {what}"
 
 
 def _choice(shares, rng):
@@ -98,7 +117,8 @@ def _bag(what, folder, rng):
     return bag
 
 
-def _model(what, rng):
+def model_file(what, rng):
+    """Octets of a model's file, with this damage or a whole one."""
     model = seeds.PLAIN if not what.startswith("model") and rng.random() < 0.5 else (
         seeds.model_of(rng))
     if what == "model tree":
@@ -106,5 +126,7 @@ def _model(what, rng):
             return seeds.text_of(damage.tree(model, rng)).encode("utf-8", "surrogatepass")
         except yaml.YAMLError:
             return seeds.text_of(model).encode()
+    if what == "model sizes":
+        model = damage.sizes(model, rng)
     words = seeds.text_of(model)
     return damage.text(words, rng) if what == "model text" else words.encode()

@@ -94,6 +94,34 @@ def tree(data, rng):
     return data
 
 
+def sizes(data, rng):
+    """Nested dicts and lists in which some numbers are up to a hundred times as large or small."""
+    data = copy.deepcopy(data)
+    for holder, key in _places(data):
+        if isinstance(holder[key], float) and rng.random() < 0.3:
+            holder[key] *= 10 ** rng.uniform(-2, 2)
+    return data
+
+
+def branch(data, rng):
+    """The same at places that are reached by a walk from the root: long lists are not hit more."""
+    data = copy.deepcopy(data)
+    for _ in range(rng.integers(1, 4)):
+        holder = data
+        while holder:
+            keys = list(holder) if isinstance(holder, dict) else range(len(holder))
+            key = keys[rng.integers(len(keys))]
+            if not isinstance(holder[key], (dict, list)) or rng.random() < 0.2:
+                changed = tree({"at": holder[key]}, rng)
+                if "at" in changed:
+                    holder[key] = changed["at"]
+                else:
+                    del holder[key]
+                break
+            holder = holder[key]
+    return data
+
+
 def _places(data):
     entries = data.items() if isinstance(data, dict) else enumerate(data)
     for key, value in list(entries):

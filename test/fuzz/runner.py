@@ -102,7 +102,7 @@ def _trouble(path):
     return ""
 
 
-def run(numbers, keep=None, told=lambda number, what, status, wrong: None):
+def run(numbers, keep=None, told=lambda number, what, status, wrong: None, judging=judge):
     """Judge cases, in a child that is replaced when one kills it.
 
     Parameters
@@ -112,6 +112,8 @@ def run(numbers, keep=None, told=lambda number, what, status, wrong: None):
         Folder for the inputs of cases with which something is wrong.
     told : callable, optional
         Gets each case's number, what it is, the exit status and what is wrong.
+    judging : callable
+        `judge`, or that of `live`.
 
     Returns
     -------
@@ -119,7 +121,7 @@ def run(numbers, keep=None, told=lambda number, what, status, wrong: None):
         What is wrong, by case; those with which nothing is are left out.
     """
     found = {}
-    child = _Child()
+    child = _Child(judging)
     try:
         for number in numbers:
             with tempfile.TemporaryDirectory(prefix="fuzz-") as folder:
@@ -137,14 +139,16 @@ def run(numbers, keep=None, told=lambda number, what, status, wrong: None):
 
 
 class _Child:
-    def __init__(self):
+    def __init__(self, judging):
+        self._judging = judging
         self._context = multiprocessing.get_context("fork")
         _warm_up()
         self._start()
 
     def _start(self):
         self._ours, theirs = self._context.Pipe()
-        self._process = self._context.Process(target=_serve, args=(theirs,), daemon=True)
+        self._process = self._context.Process(target=_serve, args=(theirs, self._judging),
+                                              daemon=True)
         self._process.start()
         theirs.close()
 
@@ -171,18 +175,20 @@ class _Child:
 
 def _warm_up():
     """Compile and load what the first case would pay for."""
+    # a bar is for eyes; read when tqdm is loaded
+    os.environ["TQDM_DISABLE"] = "1"
     rng = np.random.default_rng(0)
     model = {**seeds.PLAIN, "effects": [
         {"cause": "cubic_stiffness", "alpha3": 1e-6}, {"cause": "coulomb_friction", "level": 1e-3},
         {"cause": "hysteresis", "strength": 0.1, "beta": 1.0, "gamma": 0.0}]}
     seeds.samples(rng, model, 100)
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        seeds.results()
 
 
-def _serve(pipe):
+def _serve(pipe, judging):
     """Judge what the pipe asks for, within the limits."""
     faulthandler.disable()
-    # a bar is for eyes
-    os.environ["TQDM_DISABLE"] = "1"
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     most = pages * os.sysconf("SC_PAGE_SIZE") + MOST_BYTES
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
@@ -195,4 +201,4 @@ def _serve(pipe):
         spent = resource.getrusage(resource.RUSAGE_SELF)
         resource.setrlimit(resource.RLIMIT_CPU, (
             int(spent.ru_utime + spent.ru_stime) + MOST_SECONDS + 2, resource.RLIM_INFINITY))
-        pipe.send(judge(number, Path(folder)))
+        pipe.send(judging(number, Path(folder)))

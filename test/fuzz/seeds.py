@@ -3,6 +3,11 @@
 Nothing here is measured against, so the package's own writers will do.
 """
 
+import functools
+import json
+import tempfile
+from pathlib import Path
+
 import numpy as np
 import yaml
 from mcap.writer import CompressionType, IndexType, Writer
@@ -128,6 +133,25 @@ def _value(field, rng):
     if low is not None and high is not None and high - low < 1e4:
         return float(rng.uniform(low, high))
     return size + low if low is not None else size * (1 if rng.random() < 0.5 else -1)
+
+
+@functools.cache
+def results():
+    """What ``diagnose --json`` writes of records with causes, without, and too short."""
+    from frac_accel.cli import main
+    springs = {**PLAIN, "effects": [{"cause": "cubic_stiffness", "alpha3": 1e-3},
+                                    {"cause": "time_delay", "delay_s": 5e-4}]}
+    found = []
+    for model, count in ((springs, 4000), (PLAIN, 4000), (PLAIN, 40)):
+        with tempfile.TemporaryDirectory() as folder:
+            bag, given, result = (str(Path(folder) / name) for name in (
+                "in.mcap", "m.yaml", "r.json"))
+            write_bag(bag, samples(np.random.default_rng(count), model, count))
+            Path(given).write_text(text_of(PLAIN))
+            if main(["diagnose", bag, "--model", given, "--json", result]):
+                raise RuntimeError("the seeds cannot be diagnosed")
+            found.append(json.loads(Path(result).read_text()))
+    return found
 
 
 def text_of(data):

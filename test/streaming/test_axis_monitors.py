@@ -111,8 +111,34 @@ def test_a_coarse_sensor_at_rest_or_on_its_way_is_left_alone(seed):
     assert {fault for each in faults for fault in each} == {""}
 
 
+@pytest.mark.parametrize("absent", ["z", "yz"])
+@pytest.mark.parametrize("on_fault", ["covariance", "drop"])
+def test_an_axis_that_a_sensor_does_not_have_withholds_nothing(absent, on_fault):
+    """Zero from the first sample on: said, never trusted, and no reason to drop the others."""
+    values = motion(7, 8000)
+    rows = ["xyz".index(axis) for axis in absent]
+    values[:, rows] = 0.0
+    kernel = corrector(noise_std=0.02, on_fault=on_fault)
+    (index, _, variance), faults = run(kernel, values)
+    expected = tuple("not connected" if axis in absent else "" for axis in "xyz")
+    assert faults[-1] == expected and {f for f in faults if any(f)} == {expected}
+    late = index > 6 * RATE
+    assert late.sum() > 4900 and (variance[late][:, rows] == DISTRUSTED).all()
+    assert (np.delete(variance, rows, axis=1) < 1).all()
+    assert kernel.counters["faulty"] == kernel.counters["distrusted"] == 0
+
+
+def test_an_axis_that_has_ever_moved_is_dead_and_not_absent():
+    values = motion(8)
+    values[:, 1] = 0.0
+    values[10, 1] = 0.02
+    _, faults = run(corrector(noise_std=0.02), values)
+    assert faults[-1] == ("", "dead", "")
+
+
 def test_nothing_that_moves_for_a_minute_is_said():
     values = np.tile([0.0, 0.0981, 9.81], (int(61 * RATE), 1))
+    values[0, 0] = 0.0981
     _, faults = run(corrector(), values)
     assert faults[-1] == ("dead", "stuck", "stuck") and faults[290] == ("", "", "")
 

@@ -76,6 +76,11 @@ def test_silence_is_explained(situation, level, words):
     (changed(reference_silent_s=5.0), "the reference is lost: no message for 5 s"),
     (changed(findings=Findings(reference_overlaps=False)), "have no time in common"),
     (changed(load=0.97), "97% of a core"),
+    (changed(faults=("", "", "not connected")),
+     "axis z has never said anything but zero and counts as not connected: its covariance says so"),
+    (changed(changes=GOOD.changes | {"implausible": 2}, learns_range=True),
+     "2 samples had a value that cannot be true and were dropped (shocks of one or two samples "
+     "look the same: state plausible_range to keep them)"),
     (changed(publishers=(Publisher("/a"), Publisher("/b", "is deaf"))), "publisher: /b is deaf"),
 ])
 def test_troubles_are_warnings(situation, words):
