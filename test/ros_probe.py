@@ -16,7 +16,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from frac_accel.nodes._runtime import RawSubscription
+from frac_accel.nodes._intake import RawSubscription
 
 RELIABLE = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE)
 BEST_EFFORT = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -20,7 +20,7 @@ from sensor_msgs.msg import Imu, PointCloud2
 from .. import cdr
 from ..benchmark.live import START_NS
 from ..record.samples import Samples
-from ._runtime import RawSubscription
+from ._intake import RawSubscription
 
 DEPTH = 20_000
 QOS = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)

@@ -9,20 +9,13 @@ from sensor_msgs.msg import Temperature
 
 from frac_accel import cdr
 from frac_accel.errors import FracAccelError
-from frac_accel.nodes._runtime import (
-    INVALID_ENDPOINT,
-    NodeError,
-    RawSubscription,
-    publish_serialized,
-)
+from frac_accel.nodes._errors import INVALID_ENDPOINT, NodeError
+from frac_accel.nodes._intake import RawSubscription, publish_serialized
 from frac_accel.publisher_tracks import PublisherTracks
 
-# Filtering one sample costs as much as filtering fifty, so above this rate messages are taken in
-# groups, for so long.
-_GROUPED_ABOVE_HZ = 1500.0
-_GROUPING_S = 0.004
 _POLL_S = 0.001
-# Messages that wait for longer than this before what they bring is published count as late.
+# Messages that wait for longer than this and the budget before what they bring is published count
+# as late.
 LATE_S = 0.05
 # What happens to a topic with two publishers: the one that came first is corrected, or none is.
 ON_TWO_PUBLISHERS = ("first", "none")
@@ -38,6 +31,14 @@ def subscribe_temperature(node, filtered_topics):
 
     return node.create_subscription(Temperature, "imu/temperature", on_message,
                                     qos_profile_sensor_data)
+
+
+def declare_latency_budget(node):
+    """Declare the parameter that says how long messages may wait for each other, and heed it."""
+    node.latency_budget_s = 1e-3 * node.declare(
+        "latency_budget_ms", 5.0,
+        "longest time that a message waits for others to be handled with: costs latency, saves "
+        "processor time; 0: each as it comes", minimum=0.0, maximum=100.0)
 
 
 def raw_qos(depth):
@@ -82,7 +83,7 @@ class FilteredTopic:
         Messages that came while there was no filter to be had.
     published : int
     late : int
-        Messages that waited for longer than `LATE_S`.
+        Messages that waited for `LATE_S` longer than the node's latency budget.
     overflowed : int
         Messages that were given up because too many were waiting for a filter.
     other_publisher : int
@@ -109,8 +110,7 @@ class FilteredTopic:
         self._on_processed = on_processed
         self._intake = []
         self._task = None
-        self._hold = self._draining = False
-        self._next_s = 0.0
+        self._hold = False
         self._stream_counters, self._past_counters = {}, {}
         self._wake = node.create_guard_condition(self._advance)
         try:
@@ -265,23 +265,8 @@ class FilteredTopic:
         if len(self._intake) > _MOST_HELD:
             self.overflowed += len(self._intake) - _MOST_HELD
             del self._intake[:-_MOST_HELD]
-        if self._draining:
-            return
-        pause = self._next_s - time.monotonic()
-        if pause > 0:
-            time.sleep(pause)
-            self._draining = True
-            try:
-                self._subscription.drain()
-            finally:
-                self._draining = False
         self.last_message_s = time.monotonic()
-        self._next_s = self.last_message_s + self._grouping_s()
         self._advance()
-
-    def _grouping_s(self):
-        design = self.stream.design if self._settled else None
-        return 0.0 if design and design.sampling_rate_hz < _GROUPED_ABOVE_HZ else _GROUPING_S
 
     def _advance(self):
         """Filter what has been taken in, unless the filter is being made."""
@@ -304,7 +289,7 @@ class FilteredTopic:
         else:
             self._publish(self.messages.process(messages, arrivals_ns))
         # they came in one after the other
-        since_ns = time.time_ns() - int(1e9 * LATE_S)
+        since_ns = time.time_ns() - int(1e9 * (LATE_S + self._node.latency_budget_s))
         self.late += bisect.bisect_left(arrivals_ns, since_ns)
 
     def _submit(self, function, *arguments):

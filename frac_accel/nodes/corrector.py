@@ -18,24 +18,18 @@ from frac_accel.errors import FracAccelError
 from frac_accel.live_messages import BlockMessages, SampleMessages
 from frac_accel.live_metrics import Findings, LiveMetrics, Window, evaluate
 from frac_accel.model import SensorModel
+from frac_accel.nodes._errors import NodeError
 from frac_accel.nodes._filtered_topic import (
     ON_TWO_PUBLISHERS,
     FilteredTopic,
+    declare_latency_budget,
     raw_qos,
     subscribe_temperature,
 )
-from frac_accel.nodes._runtime import (
-    FracAccelNode,
-    NodeError,
-    OutsideExecutor,
-    RawSubscription,
-    import_message_class,
-    normalised,
-    run_node,
-)
+from frac_accel.nodes._intake import OutsideExecutor, RawSubscription
+from frac_accel.nodes._runtime import FracAccelNode, import_message_class, normalised, run_node
 
 _PERIOD_S = 1.0
-_REFERENCE_PERIOD_S = 0.1
 # For so long stamps advance at another rate before the filter is made for that.
 _OTHER_RATE_PERIODS = 2
 # Parameters that the filter is designed by, which may change while it runs.
@@ -86,10 +80,13 @@ class Corrector(FracAccelNode):
         self.create_service(Trigger, "~/reload_model", self._on_reload)
         self._cpu_s, self._tick_s = time.process_time(), time.monotonic()
         self.create_timer(_PERIOD_S, self._tick)
-        self.create_timer(_REFERENCE_PERIOD_S, self._reference_subscription.drain)
         # A collection over all that has been imported takes as long as a hundred samples.
         gc.collect()
         gc.freeze()
+
+    def take_turn(self):
+        """Take the reference, which nothing waits for."""
+        self._reference_subscription.drain()
 
     def finish(self):
         """Correct what is waiting and say what has been done."""
@@ -155,6 +152,7 @@ class Corrector(FracAccelNode):
         self.declare("depth", 2000,
                      "queue of each topic: message rate times the longest stall, at least",
                      minimum=1, maximum=10**6)
+        declare_latency_budget(self)
         self.declare("metrics_window_s", 2.0, "time over which errors and signals are judged",
                      minimum=0.1, maximum=60.0)
         edges = self.declare("metrics_bands_hz", [0.0],
