@@ -314,6 +314,14 @@ def restamped(message: bytes, stamp_ns: int) -> bytes:
     return message[:4] + struct.pack(order + "iI", int(sec), int(nanosec)) + message[12:]
 
 
+def with_frame(message: bytes, frame_id: str) -> bytes:
+    """A message of one of `SAMPLE_TYPES` with another frame."""
+    header = read_header(message)
+    frame = frame_id.encode() + b"\0"
+    start = message[:12] + struct.pack(f"{header.byte_order}I", len(frame)) + frame
+    return start + bytes(-(len(start) - 4) % 8) + message[header.body_offset:]
+
+
 def read_point_cloud(message: bytes) -> Samples:
     """A block of samples: FLOAT64 fields ``t`` (s after the header's stamp), ``x, y, z``."""
     header = read_header(message)

@@ -89,6 +89,10 @@ class Situation:
     findings : Findings
     reference_silent_s : float or None
         Time since the last reference message, where there was one.
+    zero_stamps : bool
+        Whether messages came whose stamp is zero.
+    without_clock : bool
+        Whether the time is to come from ``/clock`` and does not.
     """
 
     topic: str
@@ -113,6 +117,8 @@ class Situation:
     load: float = 0.0
     findings: Findings = dataclasses.field(default_factory=Findings)
     reference_silent_s: float | None = None
+    zero_stamps: bool = False
+    without_clock: bool = False
 
 
 def judge(situation):
@@ -125,6 +131,14 @@ def judge(situation):
     message : str
         Why nothing is being published, where nothing is; otherwise what is wrong, if anything.
     """
+    level, message = _judge(situation)
+    if situation.without_clock:
+        return max(level, WARN), ("use_sim_time is true, but nothing has come on /clock; "
+                                  f"{message}")
+    return level, message
+
+
+def _judge(situation):
     reason = _silence(situation)
     if reason:
         level, message = reason
@@ -178,6 +192,8 @@ def _no_output(s):
     if not received and changes.get("malformed"):
         return ERROR, (f"all {changes['malformed']} messages of the last second could not be read "
                        f"as the type of {s.topic}")
+    if s.zero_stamps:
+        return ERROR, (f"the stamps on {s.topic} are zero: let the driver stamp its messages")
     if s.designing:
         return WARN, "the filter is being designed"
     dropped = {name: changes.get(name, 0) for name in _DROPPED}

@@ -3,6 +3,7 @@
 import bisect
 import time
 
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Temperature
@@ -13,7 +14,6 @@ from frac_accel.nodes._errors import INVALID_ENDPOINT, NodeError
 from frac_accel.nodes._intake import RawSubscription, publish_serialized
 from frac_accel.publisher_tracks import PublisherTracks
 
-_POLL_S = 0.001
 # Messages that wait for longer than this and the budget before what they bring is published count
 # as late.
 LATE_S = 0.05
@@ -23,14 +23,16 @@ ON_TWO_PUBLISHERS = ("first", "none")
 _MOST_HELD = 200_000
 
 
-def subscribe_temperature(node, filtered_topics):
-    """Hand what comes on ``imu/temperature`` to the topics; returns the subscription."""
+def subscribe_temperature(node, filtered_topics, topic="imu/temperature"):
+    """Hand what comes on a topic of temperatures to the filters; returns the subscription."""
     def on_message(message):
-        for topic in filtered_topics:
-            topic.set_temperature(message.temperature)
+        for filtered in filtered_topics:
+            filtered.set_temperature(message.temperature)
 
-    return node.create_subscription(Temperature, "imu/temperature", on_message,
-                                    qos_profile_sensor_data)
+    try:
+        return node.create_subscription(Temperature, topic, on_message, qos_profile_sensor_data)
+    except INVALID_ENDPOINT as error:
+        raise NodeError(f"topic {topic} cannot be subscribed to: {error}") from None
 
 
 def declare_latency_budget(node):
@@ -112,16 +114,18 @@ class FilteredTopic:
         self._task = None
         self._hold = False
         self._stream_counters, self._past_counters = {}, {}
-        self._wake = node.create_guard_condition(self._advance)
         try:
             self._publisher = node.create_publisher(
                 message_class, topics[1],
                 QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE),
-                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+                qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+                # whoever asks for another QoS is named by the diagnostics
+                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
         except INVALID_ENDPOINT as error:
             raise NodeError(f"topic {topics[1]} cannot be published: {error}") from None
         self._subscription = RawSubscription(
             node, message_class, topics[0], self._on_messages, raw_qos(depth), is_direct=True)
+        node.turns.append(self._advance)
 
     @property
     def name(self):
@@ -215,7 +219,7 @@ class FilteredTopic:
             else:
                 design = self._worker.submit(self.stream.prepare, model, design, **wishes)
             while not design.done():
-                self.take_in()
+                self._node.take_in()
             self._candidate = design.result()
         finally:
             self._hold = False
@@ -229,22 +233,23 @@ class FilteredTopic:
             self._publish(self.messages.replace(model, wishes))
         self._advance()
 
-    def take_in(self):
-        """Take what has come, and wait a little: for whoever waits in the executor's thread."""
-        self._subscription.drain()
-        time.sleep(_POLL_S)
-
     def drain(self):
         """Filter what is waiting."""
         self._subscription.drain()
         self._finish_task()
+
+    def destroy(self):
+        """Leave both topics."""
+        self._node.turns.remove(self._advance)
+        self._subscription.destroy()
+        self._node.destroy_publisher(self._publisher)
 
     def _finish_task(self):
         while self._task is not None:
             if self._task.done():
                 self._collect()
             else:
-                self.take_in()
+                self._node.take_in()
 
     def _of_first(self, batch):
         """Messages of the one publisher that is corrected."""
@@ -294,7 +299,6 @@ class FilteredTopic:
 
     def _submit(self, function, *arguments):
         self._task = self._worker.submit(function, *arguments)
-        self._task.add_done_callback(lambda _: self._wake.trigger())
 
     def _collect(self):
         task, self._task = self._task, None

@@ -100,7 +100,9 @@ class RawSubscription:
             )
 
         try:
+            # outside the executor nothing would call them
             self.subscription = create(
+                SubscriptionEventCallbacks(use_default_callbacks=False) if is_direct else
                 SubscriptionEventCallbacks(
                     message_lost=self._on_lost, incompatible_qos=self._on_incompatible_qos
                 )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import re
 import signal
 import sys
+import time
 from collections.abc import Callable, Sequence
 
 import rclpy
@@ -18,6 +20,7 @@ from rclpy.exceptions import (
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.signals import SignalHandlerOptions
 
@@ -27,7 +30,8 @@ from frac_accel.nodes._intake import DirectIntake, RawSubscription
 
 # How often timers, services and all that is not taken directly have their turn; the longest that a
 # signal or the end of a node's work goes unnoticed.
-_EXECUTOR_PERIOD_S = 0.1
+EXECUTOR_PERIOD_S = 0.1
+_POLL_S = 0.001
 
 
 class FracAccelNode(Node):
@@ -35,18 +39,39 @@ class FracAccelNode(Node):
 
     A subclass sets ``done`` when its work is over, and cleans up in `finish`, which is called
     once, before the context is shut down, whether the node is done or a signal has come.
-    ``latency_budget_s`` is how long messages may wait for others to be handled with.
+    ``latency_budget_s`` is how long messages may wait for others to be handled with, ``turns``
+    what is called every ``turn_s`` between them.
     """
 
     done = False
     latency_budget_s = 0.0
+    turn_s = EXECUTOR_PERIOD_S
 
     def __init__(self, name: str) -> None:
         self.direct_subscriptions: list[RawSubscription] = []
+        self.turns: list[Callable[[], None]] = []
         super().__init__(name)
 
+    def warn_of_unknown_parameters(self) -> None:
+        """Name what the user has set and the node does not know, once all is declared."""
+        declared = [name for name in self._parameters if not name.startswith("qos_overrides.")]
+        for name in self._parameter_overrides:
+            if name in self._parameters or name.startswith("qos_overrides."):
+                continue
+            near = difflib.get_close_matches(name, declared, 1)
+            hint = f": did you mean '{near[0]}'?" if near else ""
+            self.get_logger().warning(f"parameter '{name}' is not known here{hint}")
+
     def take_turn(self) -> None:
-        """Do what is to be done about every tenth of a second; nothing by default."""
+        """Do what has its turn now."""
+        for turn in list(self.turns):
+            turn()
+
+    def take_in(self) -> None:
+        """Take what has come, and wait a little: for whoever waits in the executor's thread."""
+        for subscription in list(self.direct_subscriptions):
+            subscription.drain()
+        time.sleep(_POLL_S)
 
     def finish(self) -> None:
         """Complete what the node was doing; nothing by default."""
@@ -60,14 +85,19 @@ class FracAccelNode(Node):
         read_only: bool = True,
         minimum: float | None = None,
         maximum: float | None = None,
+        like=None,
     ):
         """Declare a parameter with its descriptor and return its value.
+
+        A default that somebody has given must be of the type of ``like``.
 
         Raises
         ------
         NodeError
             If the value given by the user has another type or is out of range.
         """
+        if like is not None and _type(default) != _type(like):
+            raise NodeError(f"parameter '{name}' must be such as {like!r}, got {default!r}")
         descriptor = ParameterDescriptor(description=description, read_only=read_only)
         if minimum is not None or maximum is not None:
             is_float = isinstance(default, float)
@@ -91,6 +121,10 @@ class FracAccelNode(Node):
             ) from None
 
 
+def _type(value):
+    return Parameter.Type.from_parameter_value(value)
+
+
 def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | None = None) -> int:
     """Run a node until it is done or the process gets SIGINT or SIGTERM; returns the exit status.
 
@@ -105,14 +139,16 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
         node = make_node()
         executor = make_executor()
         executor.add_node(node)
-        direct = DirectIntake(node)
+        direct, next_s = DirectIntake(node), 0.0
         while not (stop.requested or node.done):
             # A bounded wait, because a Python signal handler runs only between two of them.
             if direct.is_possible and node.direct_subscriptions:
-                direct.wait(_EXECUTOR_PERIOD_S)
-                executor.spin_once(timeout_sec=0)
+                direct.wait(node.turn_s)
+                if time.monotonic() >= next_s:
+                    next_s = time.monotonic() + EXECUTOR_PERIOD_S
+                    executor.spin_once(timeout_sec=0)
             else:
-                executor.spin_once(timeout_sec=_EXECUTOR_PERIOD_S)
+                executor.spin_once(timeout_sec=node.turn_s)
             node.take_turn()
         node.finish()
         return 0
