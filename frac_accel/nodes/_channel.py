@@ -139,7 +139,13 @@ class Channel:
         self._told, self._told_s[kind] = kind, now_s
         logger = self._node.get_logger()
         text = message if self.topic.name in message else f"{self.topic.name}: {message}"
-        (logger.info, logger.warning, logger.error)[level](text)
+        # three lines, as rclpy allows each of them one severity
+        if level == health.OK:
+            logger.info(text)
+        elif level == health.WARN:
+            logger.warning(text)
+        else:
+            logger.error(text)
 
     def _in_short(self, design):
         if design is not self._summary[0]:

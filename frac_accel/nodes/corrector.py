@@ -209,7 +209,7 @@ class Corrector(FracAccelNode):
         """Let each sensor report once in a period, and not all at once."""
         step_s = _PERIOD_S / max(len(self.sensors), 1)
         for i, sensor in enumerate(self.sensors.values()):
-            sensor.next_report_s = time.monotonic() + _PERIOD_S - i * step_s
+            sensor.next_report_s = time.monotonic() + _PERIOD_S + i * step_s
         self.turn_s = min(self.turn_s, step_s)
 
     def _take_turn(self):
