@@ -51,7 +51,6 @@ class Corrector(FracAccelNode):
             self._check_name(name, names)
             declare_sensor(self, name)
         self.sensors = {name: Sensor(self, name) for name in names or [""]}
-        self._is_one = not names
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._metrics = self.create_publisher(DiagnosticArray, "~/metrics", 10)
         self.add_on_set_parameters_callback(self._on_parameters)
@@ -138,7 +137,7 @@ class Corrector(FracAccelNode):
         for parameter in parameters:
             sensor, _, key = parameter.name.rpartition(".")
             if sensor not in self.sensors or key not in {**SENSOR_PARAMETERS, **TOPICS}:
-                if not self._is_one and key in SENSOR_PARAMETERS:
+                if not sensor and key in SENSOR_PARAMETERS:
                     return _result(f"{key}: a default at the start; set SENSOR.{key}")
                 continue
             if key not in DESIGN_PARAMETERS:
