@@ -252,6 +252,9 @@ def _troubles(s):
         troubles.append(f"{changes['malformed']} messages could not be read")
     if changes.get("lost"):
         troubles.append(f"{changes['lost']} messages were lost on the way: raise depth")
+    if changes.get("unpublished"):
+        troubles.append(f"{changes['unpublished']} corrected messages were not taken by the "
+                        "middleware: a subscriber that must get all of them is too slow")
     if changes.get("late"):
         troubles.append(f"{changes['late']} messages waited too long before they were corrected: "
                         "the machine is too busy")

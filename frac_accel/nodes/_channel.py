@@ -43,7 +43,7 @@ class Channel:
 
     def _on_processed(self, processed, now_ns):
         self._metrics.add(processed.raw, processed.stamps_ns, processed.values,
-                          1e-9 * (now_ns - processed.arrivals_ns))
+                          processed.arrivals_ns, now_ns)
         if len(processed.raw.stamps_ns) and not processed.raw.stamps_ns[-1]:
             self._zero_stamps = True
         if len(processed.stamps_ns):

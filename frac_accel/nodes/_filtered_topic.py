@@ -83,7 +83,8 @@ class FilteredTopic:
         Why the last design failed; empty if it did not.
     unfiltered : int
         Messages that came while there was no filter to be had.
-    published : int
+    published, unpublished : int
+        Outputs that the middleware has taken, and those that it has not.
     late : int
         Messages that waited for `LATE_S` longer than the node's latency budget.
     overflowed : int
@@ -99,7 +100,8 @@ class FilteredTopic:
                  on_processed=None, on_two_publishers="first"):
         self.messages = None
         self.failure = ""
-        self.unfiltered = self.published = self.late = self.overflowed = self._deepest = 0
+        self.unfiltered = self.published = self.unpublished = 0
+        self.late = self.overflowed = self._deepest = 0
         self.last_message_s = self.last_published_s = None
         self.other_publisher = 0
         self.tracks = PublisherTracks()
@@ -110,7 +112,7 @@ class FilteredTopic:
         self._is_optional = is_optional
         self._offered = self._candidate = self._celsius = None
         self._on_processed = on_processed
-        self._intake = []
+        self._intake, self._last_alone = [], None
         self._task = None
         self._hold = False
         self._stream_counters, self._past_counters = {}, {}
@@ -161,7 +163,8 @@ class FilteredTopic:
                                      for name, count in current.items()}
         return {**self._stream_counters, "lost": self._subscription.lost + self.overflowed,
                 "other_publisher": self.other_publisher,
-                "late": self.late, "without_filter": self.unfiltered, "published": self.published}
+                "late": self.late, "without_filter": self.unfiltered, "published": self.published,
+                "unpublished": self.unpublished}
 
     def take_queue_depth(self):
         """Most messages that were waiting at once since the last call."""
@@ -255,9 +258,11 @@ class FilteredTopic:
         """Messages of the one publisher that is corrected."""
         count, now_s = self._subscription.subscription.get_publisher_count(), time.monotonic()
         if count <= 1:
-            last = batch[-1]
-            self.tracks.alone(_frame_of(last.data), last.sequence, now_s)
+            self._last_alone = batch[-1], now_s
             return batch
+        if self._last_alone:
+            (last, at_s), self._last_alone = self._last_alone, None
+            self.tracks.alone(_frame_of(last.data), last.sequence, at_s)
         kept = [message for message in batch
                 if self.tracks.is_first(_frame_of(message.data), message.sequence, now_s)]
         if not self._takes_first:
@@ -319,8 +324,9 @@ class FilteredTopic:
         self._advance()
 
     def _publish(self, processed):
-        publish_serialized(self._publisher, processed.messages)
-        self.published += len(processed.messages)
+        published = publish_serialized(self._publisher, processed.messages)
+        self.published += published
+        self.unpublished += len(processed.messages) - published
         if processed.messages:
             self.last_published_s = time.monotonic()
         if self._on_processed:
