@@ -221,6 +221,11 @@ def encode_temperatures(temperatures: Temperatures) -> list[bytes]:
     ]
 
 
+def encode_float64(value: float) -> bytes:
+    """A serialised ``std_msgs/Float64``."""
+    return _LITTLE_ENDIAN_HEADER + struct.pack("<d", value)
+
+
 def patch_samples(
     type_name: str,
     messages: Sequence[bytes],

@@ -28,9 +28,8 @@ from frac_accel.errors import FracAccelError
 from frac_accel.nodes._errors import NodeError
 from frac_accel.nodes._intake import DirectIntake, RawSubscription
 
-# How often timers, services and all that is not taken directly have their turn; the longest that a
-# signal or the end of a node's work goes unnoticed.
-EXECUTOR_PERIOD_S = 0.1
+# How often services and all that is not taken directly have their turn.
+_EXECUTOR_PERIOD_S = 0.2
 _POLL_S = 0.001
 
 
@@ -40,12 +39,12 @@ class FracAccelNode(Node):
     A subclass sets ``done`` when its work is over, and cleans up in `finish`, which is called
     once, before the context is shut down, whether the node is done or a signal has come.
     ``latency_budget_s`` is how long messages may wait for others to be handled with, ``turns``
-    what is called every ``turn_s`` between them.
+    what is called every ``turn_s`` between them: the longest, too, that a signal goes unnoticed.
     """
 
     done = False
     latency_budget_s = 0.0
-    turn_s = EXECUTOR_PERIOD_S
+    turn_s = 0.1
 
     def __init__(self, name: str) -> None:
         self.direct_subscriptions: list[RawSubscription] = []
@@ -145,7 +144,7 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
             if direct.is_possible and node.direct_subscriptions:
                 direct.wait(node.turn_s)
                 if time.monotonic() >= next_s:
-                    next_s = time.monotonic() + EXECUTOR_PERIOD_S
+                    next_s = time.monotonic() + _EXECUTOR_PERIOD_S
                     executor.spin_once(timeout_sec=0)
             else:
                 executor.spin_once(timeout_sec=node.turn_s)

@@ -13,6 +13,7 @@ from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
+from frac_accel import cdr
 from frac_accel.correction.apart import design_apart
 from frac_accel.errors import FracAccelError
 from frac_accel.model import SensorModel
@@ -247,7 +248,7 @@ class Corrector(FracAccelNode):
                 self._figures[name] = self.create_publisher(
                     Float64, f"~/metrics/{name}", 10,
                     event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
-            self._figures[name].publish(Float64(data=float(value)))
+            self._figures[name].publish(cdr.encode_float64(value))
 
 
 def _result(reason):
