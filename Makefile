@@ -66,7 +66,7 @@ bench: setup
 
 # MINUTES=2 for a shorter one.
 soak: setup
-	$(python) -m frac_accel.benchmark.soak --minutes $(or $(MINUTES),10) --picture soak.png
+	$(python) -m frac_accel.bench.soak --minutes $(or $(MINUTES),10) --picture soak.png
 
 # Hours; goes on where it was stopped. BLIND="single --seed-set 1 --first 2" for a part of it.
 blind: export OPENBLAS_NUM_THREADS := 1

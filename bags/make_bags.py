@@ -17,7 +17,7 @@ sys.path[:0] = [str(HERE.parent), str(HERE.parent / "test")]
 import rig  # noqa: E402  (lives beside the tests)
 
 from frac_accel import write_bag  # noqa: E402
-from frac_accel.bag import RAW_TOPIC, REFERENCE_TOPIC, Samples  # noqa: E402
+from frac_accel.io.bag import RAW_TOPIC, REFERENCE_TOPIC, Samples  # noqa: E402
 
 RATE_HZ = 1000.0
 

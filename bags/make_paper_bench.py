@@ -18,13 +18,8 @@ sys.path[:0] = [str(HERE.parent), str(HERE.parent / "test")]
 
 import rig  # noqa: E402  (lives beside the tests)
 
-from frac_accel import cdr  # noqa: E402
-from frac_accel.bag import (  # noqa: E402
-    RAW_TOPIC,
-    REFERENCE_TOPIC,
-    BagWriter,
-    Samples,
-)
+from frac_accel.io import cdr  # noqa: E402
+from frac_accel.io.bag import RAW_TOPIC, REFERENCE_TOPIC, BagWriter, Samples  # noqa: E402
 
 RATE_HZ = 10_000.0
 SKEW_S = 70e-6

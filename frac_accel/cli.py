@@ -5,10 +5,10 @@ import contextlib
 import importlib
 import sys
 
-from . import one_thread
+from .commands.process import Stopped, stopping_cleanly, tolerant_output, write_details
 from .errors import FracAccelError
-from .outputs import together
-from .process import Stopped, stopping_cleanly, tolerant_output, write_details
+from .io.outputs import together
+from .signals import one_thread
 
 one_thread.prefer()
 

@@ -15,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
-from .bag import CORRECTED_TOPIC, RAW_TOPIC, REFERENCE_TOPIC, read_bag
 from .commands._common import provenance
-from .correction import Corrector
 from .errors import FracAccelError
 from .identification import identify
+from .io.bag import CORRECTED_TOPIC, RAW_TOPIC, REFERENCE_TOPIC, read_bag
 from .model import AXES, SensorModel
-from .parameters import as_mapping
+from .model.parameters import as_mapping
 from .record import Record
 from .report.identification import identification_page
 from .report.quantity import rounded
+from .streaming import Corrector
 from .validation import compare
 
 # The axis that the model comes from; it then corrects all three.

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from frac_accel import cdr
-from frac_accel.bag import Samples
+from frac_accel.io import cdr
+from frac_accel.io.bag import Samples
 
 START_NS = 1_700_000_000 * 10**9
 

@@ -6,7 +6,7 @@ response has at its frequency. The record begins in mid-motion.
 
 import numpy as np
 
-from frac_accel.record import Samples
+from frac_accel.io.samples import Samples
 
 RATE = 1000.0
 

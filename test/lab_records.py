@@ -4,8 +4,8 @@ import numpy as np
 import rig
 import scipy.signal
 
+from frac_accel.io.samples import Samples
 from frac_accel.record import Record
-from frac_accel.record.samples import Samples
 
 RATE_HZ = 2000.0
 X_ONLY = (1.0, 0.0, 0.0)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import rig
 
-from frac_accel.bag import Samples
+from frac_accel.io.bag import Samples
 from frac_accel.record import Record
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "bags"))

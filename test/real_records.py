@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from frac_accel import identify, read_bag
-from frac_accel.bag import RAW_TOPIC, REFERENCE_TOPIC
+from frac_accel.io.bag import RAW_TOPIC, REFERENCE_TOPIC
 from frac_accel.validation import validate
 
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "data"

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from frac_accel.bag import Samples
+from frac_accel.io.bag import Samples
 from frac_accel.model import SensorModel
 
 RATE = 500.0

@@ -6,7 +6,7 @@ import functools
 import numpy as np
 from scipy.fft import rfft
 
-from ..identification.recognise import recognise
+from ..identification.response.recognise import recognise
 from . import repeats, shapes, unrelated
 from .blocks import FOLDS, Blocks, intervals
 from .filters import Filters

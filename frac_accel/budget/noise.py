@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from scipy.stats import spearmanr
 
-from ..identification.recognise import recognise
+from ..identification.response.recognise import recognise
 
 # RMS of the reference, of its whole RMS, below which it is at rest, and how long that must last.
 _AT_REST = 0.01

@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 
-from ..effects.fit_starts import bulk_shift
 from ..errors import FracAccelError
 from ..model import AXES
+from ..model.effects.fit_starts import bulk_shift
 from ..record import Record
 from ..record.clock import usable
 from ..simulation import simulate

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from ..bag import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC, BagReader
 from ..errors import BagError, FracAccelError
-from ..outputs import guard, write_text
-from ..parameters import plain
+from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC, BagReader
+from ..io.outputs import guard, write_text
+from ..io.regular_file import open_regular
+from ..model.parameters import plain
 from ..record import Temperature
-from ..regular_file import open_regular
 from ..report import require_plotly
 
 _NUMBERS = re.compile(r"\[([-+.\deEnul,\s]*)\]")

@@ -50,12 +50,12 @@ def run(arguments):
         notes.append(f"{name}: not measured, rclpy is not installed")
     if "uncertainty" in names and importlib.util.find_spec("PyDynamic") is None:
         notes.append("uncertainty: PyDynamic is not installed, nothing to compare with")
-    from ..benchmark.figures import table
+    from ..bench.figures import table
     figures, before = [], os.getloadavg()
     with progress(len(names), "suite") as bar:
         for name in names:
             bar.set_description(name, refresh=False)
-            figures += importlib.import_module(f"frac_accel.benchmark.{name}").run(
+            figures += importlib.import_module(f"frac_accel.bench.{name}").run(
                 arguments.rounds)
             step(bar, name)
     machine = {"cores": os.cpu_count(), "load_average_before": before,

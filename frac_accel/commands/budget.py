@@ -2,9 +2,9 @@
 
 import sys
 
-from ..bag import read_bag
 from ..budget import WORDS, left_by
 from ..errors import FracAccelError
+from ..io.bag import read_bag
 from ..model import SensorModel
 from ._common import (
     add_bag,

@@ -8,10 +8,10 @@ import collections
 
 import numpy as np
 
-from ..bag import CORRECTED_TOPIC, BagWriter, cdr
-from ..correction import Corrector
 from ..errors import BagError
+from ..io.bag import CORRECTED_TOPIC, BagWriter, cdr
 from ..model import SensorModel
+from ..streaming import Corrector
 from ._common import (
     add_bag,
     add_filter,

@@ -2,10 +2,10 @@
 
 import sys
 
-from ..bag import TEMPERATURE_TOPIC, read_temperature
 from ..diagnosis import diagnose
+from ..io.bag import TEMPERATURE_TOPIC, read_temperature
+from ..io.outputs import say
 from ..model import SensorModel
-from ..outputs import say
 from ._common import (
     add_bag,
     add_json,

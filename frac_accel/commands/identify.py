@@ -7,7 +7,7 @@ mean, and whether they agree is said.
 from pathlib import Path
 
 from ..identification import STRUCTURES, identify
-from ..outputs import say
+from ..io.outputs import say
 from ..record import Record
 from ..report.identification import identification_page
 from ._common import (

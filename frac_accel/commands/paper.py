@@ -2,7 +2,7 @@
 again, its claims audited, and its experiment done properly on the bench's bags.
 """
 
-from ..outputs import say
+from ..io.outputs import say
 from ..paper import BAGS, PaperResult, reproduce
 from ._common import (
     add_json,

@@ -4,8 +4,8 @@ import json
 
 from ..diagnosis import Diagnosis
 from ..errors import FracAccelError
-from ..outputs import say
-from ..regular_file import read_text
+from ..io.outputs import say
+from ..io.regular_file import read_text
 from ..report.diagnosis import diagnosis_page
 from ._common import require_report
 

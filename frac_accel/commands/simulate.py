@@ -6,7 +6,7 @@ it can be identified, corrected and validated like a measured one.
 
 import numpy as np
 
-from ..bag import BagWriter, cdr
+from ..io.bag import BagWriter, cdr
 from ..model import SensorModel
 from ..record.record import UniformSamples
 from ..simulation import simulate

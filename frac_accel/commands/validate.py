@@ -1,7 +1,7 @@
 """Judge a model on a measured pair: its simulation, and the correction that it gives."""
 
-from ..bag import read_bag
 from ..errors import FracAccelError
+from ..io.bag import read_bag
 from ..model import SensorModel
 from ..validation import validate
 from ._common import (

@@ -1,9 +1,6 @@
-"""Inverse filters and the streaming kernel that runs them."""
+"""Design of inverse filters, and how sure their output is."""
 
-from .corrector import Corrector
 from .design import FilterDesign, design_inverse, design_simulator
 from .fitting import DesignedFilter
-from .stream import Filtered
 
-__all__ = ["Corrector", "DesignedFilter", "FilterDesign", "Filtered", "design_inverse",
-           "design_simulator"]
+__all__ = ["DesignedFilter", "FilterDesign", "design_inverse", "design_simulator"]

@@ -5,10 +5,10 @@ import functools
 
 import numpy as np
 
-from ..core import Arx, Gain, Oscillator
-from ..effects import Circumstances
 from ..errors import DesignError, FracAccelError, ModelError
 from ..model import AXES
+from ..model.core import Arx, Gain, Oscillator
+from ..model.effects import Circumstances
 from .fitting import LOWEST_SHARE, FilterProblem, evaluate
 from .parameter_uncertainty import design_parameter_uncertainty
 from .static_terms import StaticTermsDesign

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from ..errors import DesignError
-from .filter import ParallelFilter
+from ..signals.parallel_filter import ParallelFilter
 
 # Lowest frequency [of the sampling rate] that is told from zero: at 2 kHz a period of six days.
 LOWEST_SHARE = 1e-9

@@ -21,10 +21,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..effects import IDENTIFIED
 from ..errors import ModelError
-from ..parameters import number
-from .filter import FilterState
+from ..model.effects import IDENTIFIED
+from ..model.parameters import number
+from ..signals.parallel_filter import FilterState
 from .fitting import TAIL
 from .static_terms import coefficients
 

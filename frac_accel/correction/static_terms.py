@@ -14,10 +14,10 @@ import dataclasses
 
 import numpy as np
 
-from ..core.bouc_wen import follow_one_way
-from ..effects.base import CORE
 from ..errors import DesignError
-from .filter import FilterState, ParallelFilter
+from ..model.core.bouc_wen import follow_one_way
+from ..model.effects.base import CORE
+from ..signals.parallel_filter import FilterState, ParallelFilter
 from .fitting import FilterProblem
 
 # Points at which q is made in each sampling interval: the third harmonic of 0.6 of the Nyquist

@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import binary_erosion
 
-from ..bag import RAW_TOPIC, REFERENCE_TOPIC
-from ..core import Gain, Oscillator
-from ..effects import known_effects
 from ..errors import FracAccelError, IdentificationError
-from ..identification.excitation import learning_length, require_excitation
-from ..identification.record_checks import moving_samples
+from ..identification.checks.record_checks import moving_samples
+from ..identification.response.excitation import learning_length, require_excitation
+from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC
 from ..model import AXES, SensorModel
+from ..model.core import Gain, Oscillator
+from ..model.effects import known_effects
 from ..record import Record
 from ..record.orientation import Orientation, turned_away
+from ..record.sources import pair_of
 from ..simulation import AxisSimulator
-from ..sources import pair_of
 from .engine import Engine
 from .flat import flat_instead
 from .judgement import Diagnosis, Finding, insufficient, judge
@@ -134,6 +134,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
+    engine.aside = stray | (record.valid & ~moving)
     _require_relation(engine, axis, seed)
     return judge(engine, engine.run(seed), found, shown, loose, source[1],
                  noise_std)

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 
-from ..convolution import Convolution
-from ..effects import effect_of
 from ..errors import FracAccelError
+from ..model.effects import effect_of
+from ..signals.convolution import Convolution
 from .gain import Gain, gain
 
 _ORDERS = (1, 2, 3, 4, 6)

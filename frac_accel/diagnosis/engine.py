@@ -8,22 +8,24 @@ from scipy.fft import rfft
 from scipy.ndimage import uniform_filter1d
 
 from ..budget import Division, established_noise
-from ..effects import effect_of
 from ..errors import FracAccelError
-from ..identification.excitation import (
+from ..identification.fit.uncertainty import sandwich
+from ..identification.response.excitation import (
     alternating_stretches,
     learning_length,
     strongest_stretch,
 )
-from ..identification.uncertainty import sandwich
+from ..model.effects import effect_of
 from .gain import gain
-from .leftover import leftover
+from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
 from .problem import Problem
 from .search import Search
 
 # Improvement, in variances of one sample's noise and for each parameter, that chance does not give.
 _CHANCE = 30.0
+# A cause must explain this many times the RMS of what is left that is no noise: tenfold in power.
+WEIGHS = 3.0
 # Causes that compete for the place of each one found.
 _RIVALS = 4
 # Records of more samples are searched in part first.
@@ -40,6 +42,10 @@ _CLOSE = 30.0
 # Standard uncertainties, and share of its size, by which a parameter may differ between halves.
 _AGREE = 5.0
 _ALIKE = 0.1
+# Share of what is left that a part of the error budget must have, and at least may have, to be no
+# noise.
+_PART = 0.1
+_PART_AT_LEAST = 0.03
 # Share of the residual's power for which a coarse lattice must account.
 _COARSE = 0.2
 
@@ -78,8 +84,10 @@ class Engine:
         self._step = step
         self._wanted = used
         self.search = Search(self.problem, base, candidates, log)
+        # what counts in no fit, since a signal was at fault there
+        self.aside = np.zeros(len(record), bool)
         self.held_out_rows = used & self.problem.used & held_out(record.reference[:, axis])
-        self._learnt, self._budgets = {}, {}
+        self._learnt, self._budgets, self._structures = {}, {}, {}
         # what the numerics of the simulation may still be wrong by
         self.floor = 3e-5 * float(np.std(record.sensor[used, axis]))
 
@@ -133,13 +141,16 @@ class Engine:
 
     def score(self, fitted, variance):
         """Cost with a penalty for each parameter, in units of the noise's variance."""
-        return fitted.cost / variance + _CHANCE * len(fitted.unknowns)
+        return fitted.cost / variance + _CHANCE * fitted.size
 
     def compete(self, best):
         """Let every cause's nearest rivals take its place; the winner of all."""
         for _ in range(4):
+            unexplained = self.unexplained(best)
             for cause in best.effects:
-                if cause in self.search.base:
+                # nothing takes the place of one that is too weak to be named
+                if cause in self.search.base or \
+                        self._rms(self.added(best, cause)) < WEIGHS * unexplained:
                     continue
                 if self.problem.limit.ends_search("not every cause met its rivals"):
                     self.uncontested.add(cause)
@@ -259,6 +270,38 @@ class Engine:
         self._budgets[fitted.causes] = division.of(*(
             values[self._parted] for values in (residual, p.measured, fitted.output)))
         return self._budgets[fitted.causes]
+
+    def structure(self, fitted):
+        """Parts of what a fit leaves that are no noise: (share, part), the largest first.
+
+        What rounding to a coarse lattice makes of the simulated values is taken off: it follows the
+        motion.
+        """
+        if fitted.causes not in self._structures:
+            parts, step = self.budget(fitted).parts, self.coarse_step(fitted)
+            rounded = {}
+            if step:
+                p = self.problem
+                error = next(rounding_errors(fitted.residual, fitted.output, p.used, step))
+                rounded = {entry["part"]: SCATTER * entry["share"] for entry in self._division.of(
+                    *(values[self._parted] for values in
+                      (error, fitted.output + error, fitted.output))).parts}
+            shares = [(entry["share"] - rounded.get(entry["part"], 0.0),
+                       entry["ci95"][0] - rounded.get(entry["part"], 0.0), entry["part"])
+                      for entry in parts if entry["part"] != "noise"]
+            self._structures[fitted.causes] = sorted(
+                ((share, part) for share, low, part in shares
+                 if share > _PART and low > _PART_AT_LEAST), reverse=True)
+        return self._structures[fitted.causes]
+
+    def unexplained(self, fitted):
+        """RMS of what a fit leaves that is no noise, as far as it shows [output units]."""
+        left = self.left(fitted)
+        shares = [left.share, *(share for share, _ in self.structure(fitted))]
+        return float(np.sqrt(max(shares))) * left.rms
+
+    def _rms(self, values):
+        return float(np.sqrt(np.mean(values[self.problem.used]**2)))
 
     def learnt(self, fitted):
         """The same causes, fitted to the learning part of the record only."""

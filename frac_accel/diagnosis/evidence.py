@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 from scipy.signal import welch
 
-from ..identification.excitation import strongest_stretch
+from ..identification.response.excitation import strongest_stretch
 from ..model import AXES, SensorModel
-from ..parameters import plain
-from ..thinning import close_up, envelope, segment
+from ..model.parameters import plain
+from ..signals.thinning import close_up, envelope, segment
 from .engine import noise_peak
 from .leftover import Leftover
 

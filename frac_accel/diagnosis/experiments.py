@@ -1,6 +1,6 @@
 """What to measure where a record cannot tell causes apart."""
 
-from ..effects import known_effects
+from ..model.effects import known_effects
 
 
 def separating_experiment(causes):

@@ -3,10 +3,10 @@
 import numba
 import numpy as np
 
-from ..convolution import Convolution
-from ..core.bouc_wen import follow_one_way
-from ..core.static_force import StaticForce
-from ..effects.base import CORE
+from ..model.core.bouc_wen import follow_one_way
+from ..model.core.static_force import StaticForce
+from ..model.effects.base import CORE
+from ..signals.convolution import Convolution
 
 
 def force_response(model, effect, motion, sampling_rate_hz, lag_s=0.0):

@@ -1,8 +1,8 @@
 """Whether a record without a model is better begun with a gain than with an oscillator."""
 
-from ..core import Gain
-from ..effects import Effect, known_effects
 from ..model import SensorModel
+from ..model.core import Gain
+from ..model.effects import Effect, known_effects
 from .engine import Engine
 
 # Links that are fitted, and the share of an oscillator's residual power that one may leave.

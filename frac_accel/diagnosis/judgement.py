@@ -9,12 +9,13 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import resample_poly
 
 from ..budget import WORDS
-from ..effects import known_effects
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
-from ..parameters import fixed_values, parameter_fields
+from ..model.effects import known_effects
+from ..model.parameters import fixed_values, parameter_fields
 from ..shown import Shown
 from .empirical import fit_empirical_link
+from .engine import WEIGHS
 from .evidence import Evidence
 from .experiments import separating_experiment
 from .gain import gain
@@ -24,10 +25,6 @@ from .names import cancelling, undetermined
 # error may exceed noise that is.
 _LITTLE = 0.05
 _AS_NOISE = 1.2
-# Share of what is left that a part of the error budget must have, and at least may have, to be no
-# noise.
-_PART = 0.1
-_PART_AT_LEAST = 0.03
 # Times that another set is looked for in which no cause is doubtful.
 _AGAIN = 2
 # Verdicts that leave something to be described.
@@ -38,8 +35,9 @@ _STRETCH = 64
 _LASTS = 0.1
 # Share of the excess power that rounds to nothing.
 _NOTHING = 0.005
-# A cause must explain this many times the RMS of what is left that is no noise: tenfold in power.
-_WEIGHS = 3.0
+# A filter beside which a linear part is left must take this many times its RMS, or it may only
+# resemble the true one; several ones may in any case. Likewise what changes with time.
+_RESEMBLES = 30.0
 # Standard uncertainties by which a delay below zero is one.
 _ACAUSAL = 3.0
 # Share of the baseline's excess power that may be left where causes are named.
@@ -278,8 +276,8 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
             findings.append(entry)
         else:
             suspects.append(_suspect({cause, *instead}, margin, "another cause explains as much"))
-    findings += _moved(engine, best, loose, stds)
     return _verdict(engine, best, left, findings, suspects, found, noise,
+                    lambda fitted, stds: _moved(engine, fitted, loose, stds),
                     lambda fitted: _read_off(engine, fitted, found, shown, sensor))
 
 
@@ -353,13 +351,16 @@ def _doubts(engine, best, gains, stds, left, noise):
             doubts[cause] = words
     takes = {cause: float(np.sqrt(max(g.before**2 - g.after**2, 0.0)))
              for cause, g in gains.items()}
-    if min(takes.values(), default=np.inf) < _WEIGHS * left.rms:
-        unexplained = _no_noise(engine, best, left)
-        takes = {cause: rms for cause, rms in takes.items() if rms < _WEIGHS * unexplained}
+    if min(takes.values(), default=np.inf) < WEIGHS * left.rms:
+        unexplained = engine.unexplained(best)
         for cause, rms in takes.items():
-            doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) does not stand out of "
-                                     f"what is left unexplained ({unexplained:.3g} RMS)")
-    for cause, words in _acausal(engine, best, stds).items():
+            if rms < WEIGHS * unexplained:
+                doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) does not stand out of "
+                                         f"what is left unexplained ({unexplained:.3g} RMS)")
+    for cause, words in (_acausal(engine, best, stds)
+                         | _imitators(engine, best, takes, left)).items():
+        doubts.setdefault(cause, words)
+    for cause, words in _elsewhen(engine, best, takes, left).items():
         doubts.setdefault(cause, words)
     for pair in cancelling({cause: engine.added(best, cause) for cause in gains}):
         for cause, other in (pair, pair[::-1]):
@@ -372,18 +373,44 @@ def _doubts(engine, best, gains, stds, left, noise):
     return {cause: words for cause, words in doubts.items() if cause in gains}
 
 
-def _no_noise(engine, fitted, left):
-    """RMS of what is left that is no noise, as far as the tests of the residual see it."""
-    shares = [left.share, *(share for share, _ in _structured(engine.budget(fitted)))]
-    return float(np.sqrt(max(shares))) * left.rms
+def _filters(engine, best):
+    """Causes that act as linear filters, by cause."""
+    return {cause: effect for cause, effect in best.effects.items()
+            if cause not in engine.search.base and not effect.is_constant
+            and (is_link(effect) or effect.pure_delay_s() or effect.restates_core)}
+
+
+def _imitators(engine, best, takes, left):
+    """Linear causes beside which a filter would take still more: they imitate something else."""
+    share = sum(share for share, part in engine.structure(best) if part == "linear")
+    filters = _filters(engine, best)
+    if not share or not filters:
+        return {}
+    rest = math.sqrt(share) * left.rms
+    # a delay is common beside any filter
+    odd = [cause for cause, effect in filters.items() if not effect.everyday] or list(filters)
+    if len(odd) == 1 and takes.get(odd[0], np.inf) > _RESEMBLES * rest:
+        return {}
+    linear = [cause for cause, effect in best.effects.items()
+              if cause in takes and (cause in filters or effect.is_constant)]
+    return dict.fromkeys(linear, f"a linear filter would take another {share:.0%} of what is left: "
+                                 "the linear causes only imitate the true response")
+
+
+def _elsewhen(engine, best, takes, left):
+    """Causes that grow with time beside which what is left still changes with it."""
+    share = sum(share for share, part in engine.structure(best) if part == "time_varying")
+    rest = math.sqrt(share) * left.rms
+    words = f"{share:.0%} of what is left changes with time: the course in time is another one"
+    return {cause: words for cause in takes if best.effects[cause].shows_with_time
+            and not best.effects[cause].everyday and takes[cause] < _RESEMBLES * rest}
 
 
 def _acausal(engine, best, stds):
     """Links that stand beside a delay below zero: it takes back what they say too much."""
-    p, base = engine.problem, engine.search.base
-    links = [cause for cause, effect in best.effects.items() if cause not in base
-             and (is_link(effect) or effect.pure_delay_s()) and not effect.is_constant
-             and not effect.of_reference]
+    p = engine.problem
+    links = [cause for cause, effect in _filters(engine, best).items()
+             if not effect.of_reference and not effect.restates_core]
     delay = sum(effect.pure_delay_s() for effect in p.axis_model(best.effects).effects
                 if not effect.of_reference) - p.record.lag_s
     std = max((stds.get(cause, {}).get("delay_s", 0.0) for cause in links), default=0.0)
@@ -414,7 +441,7 @@ def _suspect(causes, margin, reason):
             "experiment": separating_experiment(causes)}
 
 
-def _verdict(engine, best, left, findings, suspects, found, noise, shown_by):
+def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_by):
     p = engine.problem
     rest = engine.held_out_rows
     spread = float(np.std(p.measured[rest]))
@@ -438,7 +465,7 @@ def _verdict(engine, best, left, findings, suspects, found, noise, shown_by):
         findings = [f for f in findings if f.cause not in doubtful]
     named = {f.cause for f in findings}
     complete = {c for c in best.effects if c not in engine.search.base} <= named
-    fitted = best
+    fitted, stds = best, engine.uncertainties(best)
     if not complete:
         # what is not named is not in the model, and the rest is fitted without it
         fitted = engine.search.fit({c: e for c, e in best.effects.items()
@@ -448,15 +475,20 @@ def _verdict(engine, best, left, findings, suspects, found, noise, shown_by):
                     if f.cause in fitted.effects else f for f in findings]
         fraction = remaining(fitted)
     # beside the model as it is in the end, not beside one with what is only suspected
-    findings = findings + shown_by(fitted)
+    findings = [*findings, *moved(fitted, stds), *shown_by(fitted)]
     after = before if fitted.causes == baseline.causes else _rms(
         p.measured - engine.learnt(fitted).output, rest)
     # what the record shows by itself, such as scattered stamps, is no part of the model
     by_itself = [f.gain.after for f in findings if f.cause not in fitted.effects]
-    accounted = _accounted(min([after, *by_itself]), spread, noise)
+    # the record is all of it, not only the part that is held out
+    error = max(after, _rms(fitted.residual, p.used))
+    accounted = _accounted(min([error, *by_itself]), spread, noise)
+    faulty = accounted and not _accounted(
+        _rms(p.measured - fitted.output, p.used | engine.aside), spread, noise)
     budget = engine.budget(fitted)
-    strange = _structured(budget)
-    verdict = _word(findings, suspects, complete, left.share, fraction, accounted, strange)
+    strange = engine.structure(fitted)
+    verdict = _word(findings, suspects, complete, left.share, fraction, accounted,
+                    strange or faulty)
     effects = {**fitted.effects, **{f.cause: f.effect for f in findings}}
     described, after = _described(engine, fitted, after) if verdict in _INCOMPLETE \
         and any(part == "linear" for _, part in strange) else ({}, after)
@@ -464,7 +496,8 @@ def _verdict(engine, best, left, findings, suspects, found, noise, shown_by):
     description = ("; the extended model has a fitted filter, which describes a part of it and "
                    "names nothing") if described else ""
     return Diagnosis(
-        verdict, _reason(verdict, after / spread, noise, accounted, strange) + description,
+        verdict, _reason(verdict, error / spread, noise, accounted, strange)
+        + _set_aside(engine.aside, p.record.valid) + description,
         {"rmse": before, "nrmse": before / spread, "noise_rms": noise_rms},
         findings, suspects,
         {"rmse": after, "nrmse": after / spread},
@@ -491,13 +524,6 @@ def _described(engine, fitted, after):
         return {}, after
     error = _rms(p.measured - output, rest)
     return ({found.effect.cause: found.effect}, error) if error < after else ({}, after)
-
-
-def _structured(budget):
-    """Parts of what is left that are no noise, with their shares, the largest first."""
-    return sorted(((entry["share"], entry["part"]) for entry in budget.parts
-                   if entry["part"] != "noise" and entry["share"] > _PART
-                   and entry["ci95"][0] > _PART_AT_LEAST), reverse=True)
 
 
 def _word(findings, suspects, complete, share, fraction, accounted, strange):
@@ -532,6 +558,13 @@ def _reason(verdict, nrmse, noise, accounted, strange):
             "undecided": f"{nrmse:.1%} of the output is unaccounted for; {_unknown(noise)}; "
                          "record the sensor at rest too, or repeat the same motion, or state its "
                          "noise (--noise-std)"}[verdict]
+
+
+def _set_aside(aside, valid):
+    """Words for the samples that were not judged."""
+    share = aside.sum() / valid.sum()
+    return f"; {aside.sum()} samples ({share:.2%}) do not count: a signal stood still or had " \
+           "spikes there" if aside.any() else ""
 
 
 def _unknown(noise):
@@ -613,8 +646,9 @@ def _read_off(engine, fitted, found, shown, sensor):
     seen = Seen(p.record, found, sensor, p.measured, fitted.output, rows, rows & p.used,
                 engine.coarse_step(fitted) is not None)
     # what the size of a residual tells presumes that it is noise, or bursts of it
-    parts = _structured(engine.budget(fitted))
+    parts = engine.structure(fitted)
     is_noise = all(part == "bursts" for _, part in parts) \
+        and engine.left(fitted).share <= _MOSTLY_NOISE \
         and _moving_share(p.record.reference[:, p.axis]) > _LASTS
     for cause, cls in known_effects().items():
         recognised = cls.recognised(seen, shown.get(cause)) if cls.read_off else None

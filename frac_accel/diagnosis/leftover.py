@@ -7,7 +7,7 @@ from scipy.fft import rfft
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
 
-from ..effects.fit_starts import bulk_shift
+from ..model.effects.fit_starts import bulk_shift
 
 _SEGMENTS = 48
 _SHIFTS = 40
@@ -26,7 +26,7 @@ _ALWAYS = 0.5
 # Times that rounding is simulated, factor by which its largest share and score may be exceeded, and
 # halvings of the range of the noise before it.
 _ROUNDINGS = 3
-_SCATTER = 1.2
+SCATTER = 1.2
 _HALVINGS = 12
 # Standard deviations of the statistic under independence by which a residual is no noise.
 _SIGNIFICANT = 6.0
@@ -92,16 +92,19 @@ def leftover(residual, simulated, used, across=(), step=None):
     if not step:
         return found
     expected = [_leftover(error, simulated, used, across)
-                for error in _rounding_errors(residual, simulated, used, step)]
-    linear, level, linear_score, level_score = _SCATTER * np.max([
+                for error in rounding_errors(residual, simulated, used, step)]
+    linear, level, linear_score, level_score = SCATTER * np.max([
         (max(e.linear, 0), e.level, max(e.linear_score, 0), max(e.level_score, 0))
         for e in expected], axis=0)
     return Leftover(found.rms, max(found.linear - linear, 0.0), max(found.level - level, 0.0),
                     found.linear_score - linear_score, found.level_score - level_score)
 
 
-def _rounding_errors(residual, simulated, used, step):
-    """Errors that rounding leaves of noisy simulated values, as large as the residual."""
+def rounding_errors(residual, simulated, used, step):
+    """Errors that rounding leaves of noisy simulated values, as large as the residual.
+
+    Yields an ndarray, shape (n,), for each seed of the noise; see `leftover` for the parameters.
+    """
     size = np.sqrt(np.mean(residual[used]**2))
     for seed in range(_ROUNDINGS):
         noise = size * np.random.default_rng(seed).standard_normal(len(simulated))

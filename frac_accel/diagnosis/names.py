@@ -44,9 +44,9 @@ def undetermined(effect, unknowns, theta, stds, core):
 
 
 def on_bound(unknown, place):
-    """Whether a parameter that is above zero lies at an end of the range that is searched."""
-    return unknown.logarithmic and any(
-        abs(place - bound) < _ON_BOUND for bound in (unknown.low, unknown.high))
+    """Whether a parameter lies at an end of a range that is searched between two."""
+    ends = unknown.low, unknown.high
+    return bool(np.isfinite(ends).all()) and any(abs(place - end) < _ON_BOUND for end in ends)
 
 
 def null_value(effect, name, core):

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from ..core.oscillator import tail_rates
-from ..effects.base import CORE, CROSS_AXIS, GAIN, Effect
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, is_link
-from ..parameters import Scales, parameter_fields
+from ..model.core.oscillator import tail_rates
+from ..model.effects.base import CORE, CROSS_AXIS, GAIN, Effect
+from ..model.parameters import Scales, fixed_values, parameter_fields
 from ..simulation import AxisSimulator, kept
 from .time_limit import TimeLimit
 
@@ -134,6 +134,12 @@ class Fitted:
     def causes(self):
         """Names of the causes."""
         return frozenset(self.effects)
+
+    @property
+    def size(self):
+        """Number of parameters that were chosen: those fitted, and the orders and kinds tried."""
+        return len(self.unknowns) + sum(len(fixed_values(effect))
+                                        for effect in self.effects.values())
 
     @functools.cached_property
     def jacobian(self):
@@ -436,10 +442,10 @@ class Problem:
         return Point(effects, simulated, columns, free, back @ components, residual,
                      float(residual @ residual))
 
-    def cost(self, effects):
+    def cost(self, effects, rough=False):
         """Cost of these causes with the parameters that they have; infinite without a bound."""
         try:
-            return self.point(effects, False).cost
+            return self.point(effects, rough).cost
         except FracAccelError:
             return np.inf
 

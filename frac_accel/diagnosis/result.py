@@ -2,10 +2,10 @@
 
 import math
 
-from ..effects import effect_of
 from ..errors import FracAccelError, ModelError
 from ..model import SensorModel
-from ..parameters import build, parameter_fields
+from ..model.effects import effect_of
+from ..model.parameters import build, parameter_fields
 from ..record.topic import Integrity
 from .evidence import Evidence
 from .gain import Gain

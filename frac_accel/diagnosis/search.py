@@ -4,12 +4,16 @@ import dataclasses
 
 import numpy as np
 
-from ..effects import IDENTIFIED, known_effects
 from ..errors import FracAccelError
-from ..parameters import fixed_values
+from ..model.effects import IDENTIFIED, known_effects
+from ..model.parameters import fixed_values
 from .problem import acts_on_spring
 
 _BEAM = 3
+# A start that fits so much worse than the set without its cause has its strength halved, at most so
+# often: the strength that screening expects presumes that all else moves along.
+_OVERSHOT = 1.5
+_HALVINGS = 8
 # Factors within which a finite change can be had by a nearby start.
 _REACH = (0.6, 1.6)
 _FITS = 8
@@ -57,7 +61,7 @@ class Search:
         self.problem, self.base = problem, base or {}
         self.candidates = candidates
         self.fits = {}
-        self.screens, self._lags = {}, {}
+        self.screens, self._starts = {}, {}
         self.log = log or (lambda words: None)
 
     def fit(self, effects):
@@ -163,20 +167,26 @@ class Search:
                 continue
             if self.problem.limit.ends_search("some causes were not screened"):
                 break
-            options = [(self._option(start, fitted, cause, known, rows, share), start.lag_s)
+            options = [(self._option(start, fitted, cause, known, rows, share), start)
                        for start in known_effects()[cause].starts(view)]
-            best, lag_s = min((entry for entry in options if entry[0]),
-                              key=lambda entry: entry[0][0], default=(None, 0.0))
+            best, start = min((entry for entry in options if entry[0]),
+                              key=lambda entry: entry[0][0], default=(None, None))
             if best:
                 found.append(best)
-                self._lags[fitted.causes, cause] = lag_s
+                self._starts[fitted.causes, cause] = start
         self.screens[fitted.causes] = sorted(found, key=lambda entry: entry[0])
         return self.screens[fitted.causes]
 
     def begun(self, fitted, cause, begin):
         """Effects to begin with where a cause of `screen` joins a fit."""
-        lag_s = self._lags.get((fitted.causes, cause), 0.0)
-        return {**fitted.effects, **self._later(fitted.effects, lag_s), cause: begin}
+        start = self._starts[fitted.causes, cause]
+        effects = {**fitted.effects, **self._later(fitted.effects, start.lag_s), cause: begin}
+        for _ in range(_HALVINGS if start.parameter else 0):
+            if self.problem.cost(effects, rough=True) < _OVERSHOT * fitted.cost:
+                break
+            half = getattr(effects[cause], start.parameter) / 2
+            effects[cause] = dataclasses.replace(effects[cause], **{start.parameter: half})
+        return effects
 
     def _later(self, effects, lag_s):
         """The delay among some linear effects, by so much later; none where there is none."""
@@ -270,9 +280,9 @@ class Search:
                     key = parent.causes | {cause}
                     if promises(parent, cost) and cost < least \
                             and (key not in wanted or cost < wanted[key][0]):
-                        wanted[key] = cost, self.begun(parent, cause, begin)
+                        wanted[key] = cost, parent, cause, begin
             chosen = sorted(wanted.values(), key=lambda entry: entry[0])[:_FITS]
-            fits = self.fit_all([effects for _, effects in chosen])
+            fits = self.fit_all([self.begun(*joins) for _, *joins in chosen])
             if not fits or best.cost - fits[0].cost < threshold(fits[0]):
                 break
             gained, best = 1 - fits[0].cost / best.cost, fits[0]

@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 
 from ..errors import ModelError
-from ..parameters import parameter_fields
+from ..model.parameters import parameter_fields
 from . import behaviour, declaration
 from .draws import Broken, Draws
 

@@ -2,8 +2,8 @@
 
 import sys
 
-from ..effects import effect_names, effect_of
 from ..errors import ModelError
+from ..model.effects import effect_names, effect_of
 from . import check_effect
 from .declaration import row
 

@@ -4,13 +4,13 @@ import dataclasses
 
 import numpy as np
 
-from ..correction import Corrector
-from ..effects.base import Effect
 from ..errors import DesignError, FracAccelError
-from ..metrics import interpolate
 from ..model import SensorModel
-from ..parameters import is_varied, parameter_fields
+from ..model.effects.base import Effect
+from ..model.parameters import is_varied, parameter_fields
+from ..signals.metrics import interpolate
 from ..simulation import simulate
+from ..streaming import Corrector
 from .draws import BAND, CORE, RATE, Broken, scale_of, sensor_with, words
 
 # Draws of each check.

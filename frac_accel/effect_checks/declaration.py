@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from ..effects import effect_names, effect_of
-from ..effects.base import REFERENCE, STAMPS, Effect
-from ..effects.fit_starts import Start
 from ..errors import FracAccelError
 from ..model import AXES, SensorModel
-from ..parameters import Scales, as_mapping, build, is_varied, parameter_fields, plain
+from ..model.effects import effect_names, effect_of
+from ..model.effects.base import REFERENCE, STAMPS, Effect
+from ..model.effects.fit_starts import Start
+from ..model.parameters import Scales, as_mapping, build, is_varied, parameter_fields, plain
 from .draws import CORE, RATE, Broken, sensor_with, span, words
 
 _TABLE = Path(__file__).parents[2] / "docs" / "effects.md"
@@ -59,7 +59,7 @@ def _complete(field):
     scale = limits["scale"]
     factor, of = scale if isinstance(scale, tuple) else (1.0, scale)
     if isinstance(of, str) and not hasattr(Scales(1.0, 1.0, 1.0), of):
-        raise Broken(f"{name}: `scale` {of!r} is no name of frac_accel.parameters.Scales")
+        raise Broken(f"{name}: `scale` {of!r} is no name of frac_accel.model.parameters.Scales")
     if not factor > 0 or (isinstance(of, (int, float)) and not of > 0):
         raise Broken(f"{name}: `scale` {scale!r}, expected above 0")
     if limits["step"] is not None and not limits["step"] > 0:
@@ -106,7 +106,7 @@ def documents(cls, draws):
     if not written or written.startswith(f"{cls.__name__}("):
         raise Broken("the class has no docstring")
     # what is no cause by itself is described below the table
-    if cls.__module__.startswith("frac_accel.effects.") and _TABLE.exists() \
+    if cls.__module__.startswith("frac_accel.model.effects.") and _TABLE.exists() \
             and all(map(_is_number, parameter_fields(cls))) \
             and row(cls) not in _TABLE.read_text(encoding="utf-8").splitlines():
         raise Broken(f"docs/effects.md lacks its row: {row(cls)}")
@@ -168,7 +168,7 @@ def starts_within_bounds(cls, draws):
 def _require_start(cls, start):
     if not isinstance(start, Start) or start.kind not in _KINDS:
         raise Broken(f"`starts` gives {start!r:.80}, expected those of "
-                     "frac_accel.effects.fit_starts")
+                     "frac_accel.model.effects.fit_starts")
     if start.parameter is not None and not hasattr(start.effect, start.parameter):
         raise Broken(f"a start scales {start.parameter!r}, which the effect does not have")
     if not start.columns:

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from ..core import Oscillator
-from ..effects.base import Circumstances
 from ..errors import ModelError
 from ..model import AxisModel, SensorModel
-from ..parameters import Scales, as_mapping, build, is_varied, parameter_fields
+from ..model.core import Oscillator
+from ..model.effects.base import Circumstances
+from ..model.parameters import Scales, as_mapping, build, is_varied, parameter_fields
 
 RATE = 1000.0  # [Hz]
 # In band for the whole test sensor, and clear of the Nyquist frequency [shares of the rate].

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import FracAccelError, IdentificationError
-from ..record import Record, Samples
-from ..sources import is_bag, pair_of
-from .candidate import STRUCTURES as _STRUCTURES
-from .candidate import Candidate, Data
-from .choice import choose, choose_classical, choose_of_several
-from .excitation import Excitation
-from .points import ResponsePoints, response_points
+from ..io.samples import Samples
+from ..record import Record
+from ..record.sources import is_bag, pair_of
+from .judge.candidate import STRUCTURES as _STRUCTURES
+from .judge.candidate import Candidate, Data
+from .judge.choice import choose, choose_classical, choose_of_several
+from .response.excitation import Excitation
+from .response.points import ResponsePoints, response_points
 from .result import Identification, identification
 
 __all__ = ["STRUCTURES", "Excitation", "Identification", "ResponsePoints", "identify",
@@ -73,7 +74,7 @@ def identify(pair: Any, axis: str = "x", structure: str = "auto",
     Examples
     --------
     >>> import numpy as np, frac_accel
-    >>> from frac_accel.core import Oscillator
+    >>> from frac_accel.model.core import Oscillator
     >>> rng = np.random.default_rng(1)
     >>> motion = np.convolve(rng.normal(size=8000), np.hanning(5), "same")
     >>> output = frac_accel.simulate(frac_accel.SensorModel(Oscillator(90.0, 0.2)), motion,

@@ -4,17 +4,17 @@ import dataclasses
 
 import numpy as np
 
-from ..core import Oscillator
-from ..effects import IDENTIFIED, identified_effect
 from ..model import SensorModel
-from ..parameters import parameter_fields, unit_of
+from ..model.core import Oscillator
+from ..model.effects import IDENTIFIED, identified_effect
+from ..model.parameters import parameter_fields, unit_of
 from ..shown import Shown
-from .arx import ArxFit
-from .candidate import needed_order, suspicions
-from .excitation import Excitation
-from .fit_validation import FitValidation, fit_validation, judge_residual
-from .notes import candidate_notes
-from .points import ResponsePoints
+from .fit.arx import ArxFit
+from .judge.candidate import needed_order, suspicions
+from .judge.fit_validation import FitValidation, fit_validation, judge_residual
+from .judge.notes import candidate_notes
+from .response.excitation import Excitation
+from .response.points import ResponsePoints
 
 # Standard uncertainties from which on the model has an offset.
 _SIGNIFICANT = 3.0

@@ -14,9 +14,9 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu
 
-from .. import cdr
-from ..benchmark.live import START_NS
-from ..record.samples import Samples
+from ..bench.live import START_NS
+from ..io import cdr
+from ..io.samples import Samples
 from ._bench_relays import QOS
 from ._intake import DirectIntake, RawSubscription
 from ._runtime import FracAccelNode

@@ -17,9 +17,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu, PointCloud2
 
-from .. import cdr
-from ..benchmark.live import START_NS
-from ..record.samples import Samples
+from ..bench.live import START_NS
+from ..io import cdr
+from ..io.samples import Samples
 from ._intake import RawSubscription
 
 DEPTH = 20_000

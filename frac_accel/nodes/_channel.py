@@ -7,9 +7,9 @@ import time
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
-from frac_accel import health
-from frac_accel.live_metrics import Findings, LiveMetrics, evaluate
 from frac_accel.nodes._filtered_topic import FilteredTopic
+from frac_accel.streaming import health
+from frac_accel.streaming.live_metrics import Findings, LiveMetrics, evaluate
 
 # For so many periods stamps advance at another rate before the filter is made for that.
 _OTHER_RATE_PERIODS = 2

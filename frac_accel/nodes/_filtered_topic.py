@@ -8,11 +8,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Temperature
 
-from frac_accel import cdr
 from frac_accel.errors import FracAccelError
+from frac_accel.io import cdr
 from frac_accel.nodes._errors import INVALID_ENDPOINT, NodeError
 from frac_accel.nodes._intake import RawSubscription, publish_serialized
-from frac_accel.publisher_tracks import PublisherTracks
+from frac_accel.streaming.publisher_tracks import PublisherTracks
 
 # Messages that wait for longer than this and the budget before what they bring is published count
 # as late.

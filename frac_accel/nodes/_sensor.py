@@ -2,17 +2,19 @@
 
 import time
 
-from frac_accel import cdr, correction, health
-from frac_accel.correction.apart import design_apart
+from frac_accel import streaming
 from frac_accel.errors import FracAccelError
-from frac_accel.live_messages import BlockMessages, SampleMessages
-from frac_accel.live_metrics import Window
+from frac_accel.io import cdr
 from frac_accel.nodes._channel import Channel
 from frac_accel.nodes._errors import NodeError
 from frac_accel.nodes._filtered_topic import raw_qos, subscribe_temperature
 from frac_accel.nodes._intake import OutsideExecutor, RawSubscription
 from frac_accel.nodes._runtime import import_message_class, normalised
 from frac_accel.nodes._sensor_parameters import DESIGN_PARAMETERS
+from frac_accel.streaming import health
+from frac_accel.streaming.apart import design_apart
+from frac_accel.streaming.live_messages import BlockMessages, SampleMessages
+from frac_accel.streaming.live_metrics import Window
 
 _SAMPLES, _BLOCKS = ("imu/data_raw", "imu/data"), ("accel/blocks_raw", "accel/blocks")
 
@@ -186,7 +188,7 @@ class Sensor:
 
     def _make_stream(self, model, wishes):
         stated = tuple(self.value("plausible_range"))
-        return correction.Corrector(
+        return streaming.Corrector(
             model, self.value("sample_rate_hz"), noise_std=self.value("noise_std") or None,
             plausible_range=stated if any(stated) else None, on_fault=self.value("on_fault"),
             largest_rate=self.value("largest_rate"), **wishes)

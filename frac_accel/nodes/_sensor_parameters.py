@@ -1,9 +1,9 @@
 """The parameters that each sensor of the corrector has."""
 
-from frac_accel import cdr
-from frac_accel.correction.stream import ON_FAULT
+from frac_accel.io import cdr
 from frac_accel.nodes._errors import NodeError
 from frac_accel.nodes._filtered_topic import ON_TWO_PUBLISHERS
+from frac_accel.streaming.stream import ON_FAULT
 
 DESIGN_PARAMETERS = ("model_file", "bandwidth_hz", "lowest_hz", "max_delay_s")
 """What the filter is designed by, which may change while it runs."""

@@ -13,9 +13,8 @@ from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from frac_accel import cdr
-from frac_accel.correction.apart import design_apart
 from frac_accel.errors import FracAccelError
+from frac_accel.io import cdr
 from frac_accel.model import SensorModel
 from frac_accel.nodes._errors import NodeError
 from frac_accel.nodes._filtered_topic import declare_latency_budget
@@ -28,6 +27,7 @@ from frac_accel.nodes._sensor_parameters import (
     declare_sensor,
     forget_sensor,
 )
+from frac_accel.streaming.apart import design_apart
 
 _PERIOD_S = 1.0
 _SENSOR_NAME = re.compile(r"[A-Za-z]\w*")

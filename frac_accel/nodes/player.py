@@ -12,8 +12,8 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from frac_accel import cdr
-from frac_accel.bag import BagReader, Message, TopicInfo
+from frac_accel.io import cdr
+from frac_accel.io.bag import BagReader, Message, TopicInfo
 from frac_accel.nodes._errors import INVALID_ENDPOINT, NodeError
 from frac_accel.nodes._runtime import FracAccelNode, import_message_class, run_node
 

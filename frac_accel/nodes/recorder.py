@@ -7,7 +7,7 @@ from functools import partial
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from frac_accel.bag import BagWriter, Qos
+from frac_accel.io.bag import BagWriter, Qos
 from frac_accel.nodes._errors import NodeError
 from frac_accel.nodes._intake import RawMessage, RawSubscription
 from frac_accel.nodes._runtime import FracAccelNode, import_message_class, run_node

@@ -2,8 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 
-from frac_accel import cdr
-from frac_accel.live_messages import NoisySensor, SampleMessages
+from frac_accel.io import cdr
 from frac_accel.model import SensorModel
 from frac_accel.nodes._errors import NodeError
 from frac_accel.nodes._filtered_topic import (
@@ -12,6 +11,7 @@ from frac_accel.nodes._filtered_topic import (
     subscribe_temperature,
 )
 from frac_accel.nodes._runtime import FracAccelNode, import_message_class, normalised, run_node
+from frac_accel.streaming.live_messages import NoisySensor, SampleMessages
 
 
 class VirtualSensor(FracAccelNode):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..core import Arx, FractionalTransferFunction
+from ..model.core import Arx, FractionalTransferFunction
 from . import published
 
 

@@ -6,8 +6,8 @@ a `Record` is a reference and a sensor together; everything else begins there.
 
 import importlib
 
-# A running node needs the samples only.
-_HOME = {"Samples": "samples", "Record": "record", "Topic": "topic", "Temperature": "temperature",
+# Loaded when first used.
+_HOME = {"Record": "record", "Topic": "topic", "Temperature": "temperature",
          "Orientation": "orientation"}
 
 __all__ = sorted(_HOME)

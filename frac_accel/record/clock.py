@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 from scipy.ndimage import median_filter
 
-from ..correction.timing import estimate_rate
 from ..errors import FracAccelError
+from ..signals.sample_rate import estimate_rate
 
 # Scatter of the stamps [intervals] with which rounding still finds the instants, and the share of
 # samples that may have more.

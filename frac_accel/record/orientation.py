@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 
 from ..errors import FracAccelError
+from ..io.samples import Samples
 from ..model import AXES
 from .relation import BLOCKS, products, refined
-from .samples import Samples
 
 # Axes with less power than this, of the strongest one, do not move.
 _RESTS = 1e-3

@@ -106,7 +106,7 @@ class Record:
         """The topics, or what the record's own arrays give for them."""
         if self.topics is not None:
             return self.topics
-        from .samples import Samples
+        from ..io.samples import Samples
         stamps = np.round(np.flatnonzero(self.valid) * 1e9 / self.sampling_rate_hz)
         return tuple(Topic(Samples.of(stamps, values[self.valid]), name, fewest=3) for name, values
                      in (("reference", self.reference), ("sensor", self.sensor)))
@@ -128,7 +128,7 @@ class Record:
     def load(cls, bag, reference=None, sensor=None, axis="x"):
         """Record of two topics of a bag (default: the usual ones); errors as `of` and `read_bag`.
         """
-        from ..bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
+        from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC, read_bag
         names = [reference or REFERENCE_TOPIC, sensor or RAW_TOPIC]
         topics = read_bag(bag, names)
         try:

@@ -1,7 +1,7 @@
 """The page of a diagnosis: the verdict, its evidence, what was considered and what is left."""
 
 from ..budget import WORDS
-from ..parameters import parameter_fields
+from ..model.parameters import parameter_fields
 from .diagnosis_figures import discrepancy
 from .figures import COVERAGE_FACTOR
 from .page import Page

@@ -8,7 +8,7 @@ import dataclasses
 
 import numpy as np
 
-from ..thinning import envelope
+from ..signals.thinning import envelope
 from .page import require_plotly
 
 MEASURED = "#8a919a"

@@ -4,9 +4,9 @@ import numpy as np
 from scipy.signal import coherence, welch
 
 from ..errors import ModelError
-from ..identification.excitation import strongest_stretch
+from ..identification.response.excitation import strongest_stretch
 from ..model import AXES
-from ..thinning import close_up, segment
+from ..signals.thinning import close_up, segment
 from ..uncertainty import response_uncertainty
 from . import figures
 from .page import Page

@@ -7,7 +7,7 @@ from pathlib import Path
 from string import Template
 
 from ..errors import FracAccelError
-from ..outputs import write_text
+from ..io.outputs import write_text
 
 _TEMPLATE = Path(__file__).with_name("page.html")
 # A page with more sections than this has a table of contents.

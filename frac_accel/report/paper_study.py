@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..identification.fit_validation import p_words
+from ..identification.judge.fit_validation import p_words
 from ..paper.study.answer import rival
 from ..paper.study.candidates import CLASSICAL, FRACTIONAL
 from ..paper.study.map import BANDS_HZ, NOISE_DB, ORDERS, SEEDS, VERDICTS

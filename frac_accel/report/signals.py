@@ -1,6 +1,6 @@
 """What the pages say about signals, in words."""
 
-from ..thinning import MOST_POINTS
+from ..signals.thinning import MOST_POINTS
 
 
 def sentence(words):

@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 
-from ..convolution import Convolution
-from ..effects import IDENTIFIED
 from ..errors import FracAccelError
 from ..model import AXES
+from ..model.effects import IDENTIFIED
+from ..signals.convolution import Convolution
 from ..simulation import static_gain
 from .parameters import LINEAR, UncertainAxis
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..correction.filter import steady_state
 from ..errors import FracAccelError
-from ..linear_filter import run_filter
+from ..signals.linear_filter import run_filter
+from ..signals.parallel_filter import steady_state
 
 # Of the noise's power, what the squared impulse response may leave out.
 _TAIL = 1e-12

@@ -4,13 +4,13 @@ import dataclasses
 
 import numpy as np
 
-from ..core import Arx, FractionalTransferFunction
-from ..core.sensor_form import from_sensor_parameters, sensor_parameters
-from ..effects import IDENTIFIED, effect_of
-from ..effects.base import GAIN
 from ..errors import ModelError
 from ..model import AXES, AxisModel
-from ..parameters import is_varied, number, parameter_fields
+from ..model.core import Arx, FractionalTransferFunction
+from ..model.core.sensor_form import from_sensor_parameters, sensor_parameters
+from ..model.effects import IDENTIFIED, effect_of
+from ..model.effects.base import GAIN
+from ..model.parameters import is_varied, number, parameter_fields
 
 # Rounding that a covariance may have suffered, of its correlations.
 _ROUNDING = 1e-6

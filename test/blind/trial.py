@@ -5,9 +5,9 @@ import time
 import numpy as np
 
 from frac_accel import SensorModel, simulate
-from frac_accel.core import Oscillator
-from frac_accel.effects import known_effects
 from frac_accel.errors import FracAccelError
+from frac_accel.model.core import Oscillator
+from frac_accel.model.effects import known_effects
 
 # Groups whose correction is judged; the roads' rates and noise are no matter of the sensor.
 CORRECTED = ("single", "multiple")

@@ -3,7 +3,7 @@
 import numpy as np
 import yaml
 
-from frac_accel.bag import Samples, write_bag
+from frac_accel.io.bag import Samples, write_bag
 
 from . import damage, seeds
 

@@ -8,7 +8,7 @@ import lz4.frame
 import numpy as np
 import zstandard
 
-from frac_accel.bag.mcap_file import MAGIC
+from frac_accel.io.bag.mcap_file import MAGIC
 
 NASTY_NUMBERS = (0, 1, -1, 127, 128, 255, 256, 2**15, 2**16 - 1, 2**31 - 1, 2**31, 2**32 - 1,
                  2**63 - 1, 2**63, 2**64 - 1)

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from frac_accel import SensorModel
-from frac_accel.bag import BagReader
 from frac_accel.cli import main
+from frac_accel.io.bag import BagReader
 
 from . import seeds
 from .case import make

@@ -7,8 +7,9 @@ import numpy as np
 import yaml
 from mcap.writer import CompressionType, IndexType, Writer
 
-from frac_accel import SensorModel, cdr, simulate
-from frac_accel.bag import (
+from frac_accel import SensorModel, simulate
+from frac_accel.io import cdr
+from frac_accel.io.bag import (
     RAW_TOPIC,
     REFERENCE_TOPIC,
     TEMPERATURE_TOPIC,
@@ -17,9 +18,9 @@ from frac_accel.bag import (
     Temperatures,
     write_bag,
 )
-from frac_accel.effects import known_effects
 from frac_accel.model import SCHEMA
-from frac_accel.parameters import parameter_fields
+from frac_accel.model.effects import known_effects
+from frac_accel.model.parameters import parameter_fields
 
 RATE_HZ = 1000.0
 COUNT = 400

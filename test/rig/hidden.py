@@ -94,7 +94,7 @@ class HiddenCase:
 
     def samples(self):
         """Reference and sensor as `Samples`, and stamps and °C of the temperature or None."""
-        from frac_accel.record.samples import Samples
+        from frac_accel.io.samples import Samples
 
         record = self.record
         temperature = None
@@ -107,7 +107,7 @@ class HiddenCase:
 
     def write(self, path):
         """The same as a bag, under the default topics."""
-        from frac_accel import bag
+        from frac_accel.io import bag
 
         reference, sensor, temperature = self.samples()
         topics = {bag.REFERENCE_TOPIC: reference, bag.RAW_TOPIC: sensor}

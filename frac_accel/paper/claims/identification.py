@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ...core import Oscillator
 from ...errors import IdentificationError
-from ...identification.excitation import require_excitation
+from ...identification.response.excitation import require_excitation
+from ...model.core import Oscillator
 from .. import models, published
 from ..metric import sampled_sines
 from ..tables import responses

@@ -8,7 +8,7 @@ levels and bandwidths.
 
 import dataclasses
 
-from ...identification.fit_validation import p_words
+from ...identification.judge.fit_validation import p_words
 from .answer import answer
 from .bench import SENSORS, SWEPT, bags_of, diagnosed, judge_sensor, refusal
 from .map import VERDICTS, cases, make_map, workers

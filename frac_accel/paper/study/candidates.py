@@ -4,14 +4,14 @@ import dataclasses
 
 import numpy as np
 
-from ...core import FractionalTransferFunction, Oscillator
-from ...core.principal_sheet import fractional_root
-from ...effects import identified_effect
-from ...effects.low_pass_lag import LowPassLag
 from ...errors import IdentificationError
-from ...identification.output_error import Fit, fit_output_error
-from ...identification.structures import FractionalStructure, OscillatorStructure
+from ...identification.fit.output_error import Fit, fit_output_error
+from ...identification.fit.structures import FractionalStructure, OscillatorStructure
 from ...model import SensorModel
+from ...model.core import FractionalTransferFunction, Oscillator
+from ...model.core.principal_sheet import fractional_root
+from ...model.effects import identified_effect
+from ...model.effects.low_pass_lag import LowPassLag
 
 CLASSICAL, FRACTIONAL = "classical", "fractional"
 LOW_PASS, SLOPE = "classical + low-pass", "classical + slope"

@@ -7,7 +7,7 @@ from scipy.stats import chi2
 
 from ...errors import IdentificationError
 from ...identification import response_points
-from ...identification.points import ResponsePoints
+from ...identification.response.points import ResponsePoints
 from ...simulation import simulate
 
 # The paper's frequencies.

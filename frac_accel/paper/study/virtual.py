@@ -10,10 +10,10 @@ import dataclasses
 
 import numpy as np
 
-from ...core import Oscillator
-from ...effects import identified_effect
-from ...effects.low_pass_lag import LowPassLag
 from ...model import SensorModel
+from ...model.core import Oscillator
+from ...model.effects import identified_effect
+from ...model.effects.low_pass_lag import LowPassLag
 from ...simulation import simulate
 from .. import published
 from .candidates import AS_MANY, FRACTIONAL, fit_all

@@ -1,0 +1,1 @@
+"""What makes a record or a fit unfit: faults, delays, exchanged topics."""

@@ -1,0 +1,61 @@
+"""What the samples that are not clipped say of those that may be."""
+
+import numpy as np
+
+from ...errors import IdentificationError
+from ...record.clipping import clipped
+from ..fit.output_error import fit_output_error
+from ..fit.prediction import predicted
+from ..fit.structures import OscillatorStructure
+from ..response.frequency_response import bulk_delay
+
+# Taps of the filter from sensor to reference on either side, and rows that it is fitted to.
+_TAPS = 8
+_ROWS_PER_TAP = 20
+_ROWS = 20_000
+
+
+def clipped_sensor(reference, sensor, valid, step, sampling_rate_hz, lag_s):
+    """Clipped samples of the sensor, by a classical sensor identified without them.
+
+    Parameters
+    ----------
+    reference, sensor : ndarray, shape (n,)
+    valid : ndarray of bool, shape (n,)
+    step : float or None
+        Of the sensor's lattice.
+    sampling_rate_hz, lag_s : float
+        As in `Record`.
+
+    Returns
+    -------
+    Clipping
+    """
+    def model(others):
+        structure = OscillatorStructure()
+        fit = fit_output_error(structure, reference, sensor, sampling_rate_hz, others, lag_s)
+        return predicted(structure, fit, reference, sampling_rate_hz, lag_s)
+    return clipped(sensor, valid, step, model)
+
+
+def clipped_reference(reference, sensor, valid, step):
+    """Clipped samples of the reference, by what a filter says of them that is fed by the sensor.
+
+    The acceleration is a combination of a seismic sensor's output and its derivatives, which a few
+    taps on either side give. Parameters and result as in `clipped_sensor`.
+    """
+    def model(others):
+        delay = bulk_delay(reference, sensor)
+        rows = np.flatnonzero(others)
+        if len(rows) < _ROWS_PER_TAP * (2 * _TAPS + 2):
+            raise IdentificationError("too little is left of the reference")
+        rows = rows[::max(1, len(rows) // _ROWS)]
+        taps = np.linalg.lstsq(_columns(sensor, rows, delay), reference[rows], rcond=1e-10)[0]
+        return _columns(sensor, np.arange(len(sensor)), delay) @ taps
+    return clipped(reference, valid, step, model)
+
+
+def _columns(sensor, rows, delay):
+    """Sensor around each row, `delay` samples later, and a constant."""
+    places = rows[:, None] + delay + np.arange(-_TAPS, _TAPS + 1)
+    return np.c_[sensor[np.clip(places, 0, len(sensor) - 1)], np.ones(len(rows))]

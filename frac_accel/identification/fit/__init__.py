@@ -1,0 +1,1 @@
+"""Model structures, and their fits in time and in frequency."""

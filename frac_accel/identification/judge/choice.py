@@ -1,0 +1,221 @@
+"""Which structure the data call for, and what several records say together."""
+
+import dataclasses
+
+import numpy as np
+
+from ...errors import FracAccelError, IdentificationError
+from ..fit.structures import OscillatorStructure
+from ..response.excitation import excited_band
+from ..response.frequency_response import linear_share
+from .candidate import Candidate, fit_of, fitted
+from .fit_validation import judge_residual
+from .records import agreement, combine, freed, is_open
+
+# Standard uncertainties by which the damping order must differ from 1 to be called fractional.
+_SIGNIFICANT = 3.0
+# Share of an oscillator's held-out residual that a model which names no cause may leave.
+_CLEARLY = 0.7
+# Share of what a linear model could still explain of the classical residual that a fractional
+# damping must take away, and the share of a residual that chance alone seems to explain.
+_TAKEN, _CHANCE = 0.25, 0.1
+# A resonance that far above the excited band, or known no better than this, is out of sight; of a
+# gain, the held-out residual over that with a resonance with which the gain will do.
+_IN_SIGHT, _UNDETERMINED, _NO_BETTER = 1.5, 0.2, 1.05
+# Time constants after which a motion from before the record counts no more, and samples at both
+# ends that the band-limited simulation cannot know.
+_SETTLING = 7.0
+_EDGE = 32
+
+
+def choose(data):
+    """Best of the structures for one record, and why."""
+    flat = flat_instead(data)
+    chosen, best, reason = (flat[0], flat[0].held_out_nrmse, flat[1]) if flat \
+        else _choose_oscillator(data)
+    if linear_share(data.reference, chosen.fit.residual) < 1 - _CLEARLY**2:
+        return chosen, reason
+    try:
+        arx = Candidate.of("arx", data)
+    except IdentificationError:
+        return chosen, reason
+    held_out = f"held-out residual {arx.held_out_nrmse:.3%} against {best:.3%}"
+    if not arx.held_out_nrmse < _CLEARLY * best:
+        return chosen, (f"{reason}; a free transfer function in z does not predict clearly better: "
+                        f"{held_out}")
+    others = "a gain" if flat else "an oscillator with classical or fractional damping"
+    return arx, (f"it predicts clearly better than {others}: {held_out}; something else acts, "
+                 "which its coefficients cannot name")
+
+
+def choose_classical(data):
+    """A gain where the record shows no resonance, otherwise an oscillator, and why."""
+    return flat_instead(data) or (Candidate.of("oscillator", data), "a resonance shows")
+
+
+def flat_instead(data):
+    """A gain and why, or None where the record shows the resonance of an oscillator.
+
+    Whatever else makes fast motion smaller, such as a smoothed reference, bends a resonance out
+    there to its liking; it is believed only where it predicts clearly better.
+    """
+    try:
+        flat = Candidate.of("gain", data)
+        classical = Candidate.of("oscillator", data)
+    except IdentificationError:
+        return None
+    resonance = classical.fit["natural_frequency_hz"]
+    std = classical.fit.std[classical.fit.names.index("natural_frequency_hz")]
+    highest = excited_band(data.reference, data.sensor, data.pair.sampling_rate_hz)[1]
+    if resonance < _IN_SIGHT * highest and std < _UNDETERMINED * resonance:
+        return None
+    delay, delay_std = (values[classical.fit.names.index("delay_s")]
+                        for values in (classical.fit.values, classical.fit.std))
+    if flat.held_out_nrmse <= _NO_BETTER * classical.held_out_nrmse:
+        why = "does not predict clearly better than a gain"
+    elif delay < -_SIGNIFICANT * delay_std:
+        why = (f"would answer {-delay:.3g} s before the reference moves, as if that were smoothed; "
+               "its parameters are open, and a gain is all that can be said")
+    else:
+        return None
+    place = f"at {resonance:.4g} +- {std:.2g} Hz" if std < resonance else "at any frequency above"
+    return flat, (f"no resonance shows up to {highest:.4g} Hz: an oscillator {place} {why} "
+                  f"(held-out residual "
+                  f"{classical.held_out_nrmse:.3%} against {flat.held_out_nrmse:.3%})")
+
+
+def choose_of_several(structure, datas, records):
+    """Combined model of several records, why its structure, and how the records agree.
+
+    Parameters
+    ----------
+    structure : str
+    datas : list of Data
+    records : list of str
+        Their names.
+
+    Returns
+    -------
+    Candidate, str, RecordAgreement
+    """
+    if structure != "auto":
+        chosen, agreeing = _combined(structure, datas, records)
+        return chosen, "requested", agreeing
+    classical, agreeing = _combined("oscillator", datas, records)
+    try:
+        fractional, fractionally = _combined("fractional", datas, records)
+    except IdentificationError as error:
+        return classical, f"no fractional model: {error}", agreeing
+    better, reason = _preferred(classical, fractional, datas, "residual on other records")
+    return better, reason, fractionally if better is fractional else agreeing
+
+
+def _choose_oscillator(data):
+    """The better of classical and fractional, the smallest held-out residual, and why."""
+    classical = Candidate.of("oscillator", data)
+    try:
+        fractional = Candidate.of("fractional", data)
+    except IdentificationError as error:
+        return classical, classical.held_out_nrmse, f"no fractional model: {error}"
+    chosen, reason = _preferred(classical, fractional, [data], "held-out residual")
+    return chosen, min(classical.held_out_nrmse, fractional.held_out_nrmse), reason
+
+
+def _preferred(classical, fractional, datas, judged):
+    """The better of two candidates of the same records, and why."""
+    order = fractional.fit["damping_order"]
+    std = fractional.fit.std[fractional.fit.names.index("damping_order")]
+    score = f"damping order {order:.4g} +- {std:.2g}"
+    held_out = (f"{judged} {fractional.held_out_nrmse:.3%} against "
+                f"{classical.held_out_nrmse:.3%} of the classical model")
+    if abs(order - 1) <= _SIGNIFICANT * std:
+        return classical, f"a fractional damping is not significant: {score}"
+    if not fractional.held_out_nrmse < classical.held_out_nrmse:
+        return classical, f"a fractional damping does not predict better: {held_out}"
+    if not _explains(classical, fractional, datas):
+        return classical, ("a fractional damping does not explain what the classical model lacks: "
+                           f"{held_out}")
+    return fractional, f"{score} differs from 1; {held_out}"
+
+
+def _explains(classical, fractional, datas):
+    """Whether the fractional damping takes its share of what the classical model lacks.
+
+    Whatever else acts (a nonlinear spring, say) can make an order differ from 1 significantly that
+    explains next to nothing of it.
+    """
+    taken = lacking = 0.0
+    for one, other, data in zip(classical.fits, fractional.fits, datas):
+        power = (one.rmse / data.spread)**2
+        taken += power - (other.rmse / data.spread)**2
+        lacking += power * max(linear_share(data.reference, one.residual) - _CHANCE, 0.0)
+    return taken >= _TAKEN * lacking
+
+
+def _combined(name, datas, records):
+    """Candidate of all records together and their RecordAgreement."""
+    structure, first = fitted(name, datas[0])
+    # the orders of a transfer function must be the same in all
+    start = first.unknowns if name == "arx" else None
+    fits = [first, *(fit_of(structure, data, start) for data in datas[1:])]
+    datas[0].progress(f"judging the {name} structure on the other records")
+    table = [[data.predicted(structure, fit, _settled(structure, fit, data)) for data in datas]
+             for fit in fits]
+    compared, held = _held_alike(structure, fits, datas)
+    combination = combine(compared)
+    if held:
+        combination = freed(combination, fits, held)
+    joint = dataclasses.replace(first, values=combination.values,
+                                covariance=combination.covariance)
+    try:
+        structure.core(joint).require_stable("core")
+    except FracAccelError:
+        raise IdentificationError(
+            f"the records' models contradict each other so much (chi-squared "
+            f"{combination.statistic:.3g} of {combination.freedom} degrees of freedom) that their "
+            "mean is not stable; identify each record by itself") from None
+    joined = [data.predicted(structure, joint, _settled(structure, joint, data))
+              for data in datas]
+    tests = [judge_residual(structure.core(fit), fit, data.reference, data.pair)
+             for fit, data in zip(fits, datas)]
+    result = agreement(records, fits, combination,
+                       [[entry.nrmse for entry in row] for row in table],
+                       [entry.nrmse for entry in joined],
+                       all(test is None or test.independent for test in tests), compared, held)
+    others = [(i, j) for i in range(len(fits)) for j in range(len(fits)) if i != j]
+    worst = max(others, key=lambda pair: table[pair[0]][pair[1]].nrmse)
+    return Candidate(structure, name, joint, tuple(fits),
+                     float(np.sqrt(np.mean([entry.nrmse**2 for entry in joined]))),
+                     float(np.sqrt(np.mean([table[i][j].nrmse**2 for i, j in others]))),
+                     table[worst[0]][worst[1]]), result
+
+
+def _held_alike(structure, fits, datas):
+    """Fits to compare the records by, and what is held at the same value in all of them.
+
+    A parameter that a record leaves open takes others with it along a curve, where linearised
+    covariances call records of one sensor different.
+    """
+    held = {}
+    compared = fits
+    # only there is each unknown one parameter's own
+    if type(structure) is not OscillatorStructure:
+        return compared, held
+    for name in structure.names:
+        if not is_open(name, compared):
+            continue
+        position = fits[0].names.index(name)
+        best = min(fits, key=lambda fit: fit.std[position] / fit.values[position])
+        held[name] = best
+        fixed = {structure.names.index(name): fit.unknowns[structure.names.index(name)]
+                 for name, fit in held.items()}
+        compared = [data.fit(structure, start=best.unknowns, held=fixed) for data in datas]
+    return compared, held
+
+
+def _settled(structure, fit, data):
+    """Part of a record after the motion before it, which another record's model cannot know."""
+    decay = np.abs(structure.core(fit).poles().real)
+    slowest = np.min(decay, initial=np.inf)
+    samples = _SETTLING * data.pair.sampling_rate_hz / slowest if slowest > 0 else np.inf
+    return slice(int(min(max(samples, _EDGE), len(data.sensor) // 4)), -_EDGE)

@@ -1,0 +1,1 @@
+"""What spectra tell without a model: excitation, frequency response, its points."""

@@ -1,0 +1,1 @@
+"""What is read and written: bags, messages, and all files besides."""

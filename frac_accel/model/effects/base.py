@@ -1,0 +1,359 @@
+"""What every effect can do: be simulated and be inverted.
+
+An effect acts in one of these ways, and overrides what it needs:
+
+* on the core's parameters (`change_core`), e.g. fractional damping;
+* on the core's spring (`add_force`), e.g. cubic stiffness;
+* as a linear time-invariant link (`transfer_function`, `pure_delay_s`), e.g. a low-pass: all
+  links of an axis and its core form one composite response, simulated and inverted as one filter;
+* on the sensor's clock (`clock_ratio`);
+* on the samples after all that (`simulate`, `invert`), e.g. an offset; where either depends on the
+  samples before, `live` gives an object that remembers them.
+
+Nothing outside the file of a cause names it: what is particular to it, it declares itself.
+"""
+
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from ...errors import ModelError
+from ..core import Oscillator
+from ..parameters import is_varied, parameter_fields
+
+# Place in the signal's way through the sensor, from base to record. What happened to the reference
+# on its way to the record is undone before.
+(REFERENCE, MOUNTING, CORE, CONDITIONER, DELAY, GAIN, CROSS_AXIS, OFFSET, DEAD_ZONE, INTERFERENCE,
+ CLIPPING, QUANTIZATION, STAMPS) = range(-1, 12)
+
+
+class Circumstances(NamedTuple):
+    """When and how warm the samples were.
+
+    Attributes
+    ----------
+    time_s : ndarray, shape (n,)
+        Time [s] since the record's start.
+    temperature_c : ndarray, shape (n,), or None
+        Temperature [°C]; None or NaN where it is not known.
+    """
+
+    time_s: np.ndarray
+    temperature_c: np.ndarray
+
+
+    @classmethod
+    def at_rest(cls, n):
+        """`n` samples at the record's start and at 25 °C."""
+        return cls(np.zeros(n), np.full(n, 25.0))
+
+
+class Reading(NamedTuple):
+    """A cause that a record shows by itself, beside what a simulation explains of it.
+
+    Attributes
+    ----------
+    std : dict of str to float
+        Standard uncertainties of the parameters.
+    before, after : ndarray, shape (m,)
+        Errors of the simulation without and with the cause, in the samples' order.
+    evidence : str
+    """
+
+    std: dict
+    before: np.ndarray
+    after: np.ndarray
+    evidence: str
+
+
+class Open(NamedTuple):
+    """A cause that the model in use leaves open, since it knows a parameter only so well.
+
+    Attributes
+    ----------
+    effect : Effect
+        What the model in use says.
+    std : dict of str to float
+        Standard uncertainty by parameter; infinite where nothing is known.
+    """
+
+    effect: object
+    std: dict
+
+
+class Effect:
+    """Base of all effects; a subclass is a frozen dataclass of its parameters.
+
+    All that anything else needs of a cause is declared here, in its own file: `check_effect` tells
+    whether it holds together.
+    """
+
+    cause: ClassVar[str]
+    stage: ClassVar[int]
+    explanation: ClassVar[str]
+    # what separates this cause from its rivals where a record cannot
+    experiment: ClassVar[str] = "Repeat with a wider band, and at half and at twice the level."
+    needs_temperature: ClassVar[bool] = False
+
+    # True for what happened to the recorded reference alone: its link turns that back into the
+    # motion, no correction knows of it, and a model file has it among the `reference_faults`
+    of_reference: ClassVar[bool] = False
+    # another cause that says the same with the other sign; where both do, this one is named
+    mirrors: ClassVar[str | None] = None
+    # True for what a record shows by itself (`of_record`, `reading`), and no fit looks for
+    read_off: ClassVar[bool] = False
+    # True where one clock or one way to the stamps makes it the same for all axes
+    common_to_axes: ClassVar[bool] = False
+    # True for a link that is one number at all frequencies
+    is_constant: ClassVar[bool] = False
+    # True for what says anew what the core already says
+    restates_core: ClassVar[bool] = False
+    # parameters whose null value makes this cause a special case of a simpler one
+    nested: ClassVar[tuple[str, ...]] = ()
+    # True for what grows along a record, so that a part of it may not show it
+    shows_with_time: ClassVar[bool] = False
+    # True for what is so common and so cheap to fit that every search begins with it, too
+    everyday: ClassVar[bool] = False
+    # name among the parameters that `identify` finds beside a core
+    identified_as: ClassVar[str | None] = None
+
+    @classmethod
+    def starts(cls, view):
+        """Where a fit of this cause to a record may begin.
+
+        Parameters
+        ----------
+        view : diagnosis.search.View
+            What the search knows so far.
+
+        Returns
+        -------
+        list of Start
+            Of `fit_starts`; none where the record cannot show this cause.
+        """
+        return []
+
+    @classmethod
+    def fitted_parameters(cls, axis, excited):
+        """Names of the parameters that a record of this axis can determine.
+
+        Parameters
+        ----------
+        axis : {"x", "y", "z"}
+        excited : dict of str to bool
+            By axis, whether the reference moves along it.
+        """
+        return [field.name for field in parameter_fields(cls) if is_varied(field)]
+
+    def alternatives(self):
+        """Effects of this cause to go on from that differ in what no fit varies, such as an order.
+
+        Nearest ones are enough: each that fits better is asked for its own.
+        """
+        return []
+
+    @classmethod
+    def left_open(cls, axis_model, stds, stamps_std_s):
+        """`Open` where the model in use knows this cause only so well, otherwise None.
+
+        Parameters
+        ----------
+        axis_model : AxisModel
+        stds : dict of str to float
+            Standard uncertainties of the model's own parameters, as ``identify`` names them.
+        stamps_std_s : float
+            Uncertainty [s] of the record's common instants, by stamps that scatter.
+        """
+        return None
+
+    @classmethod
+    def of_record(cls, found, measured):
+        """Effect of this cause as a record shows it by itself, or None.
+
+        Parameters
+        ----------
+        found : Integrity
+        measured : ndarray, shape (n,)
+        """
+        return None
+
+    def spoiled(self, measured):
+        """Mask, shape (n,): samples that because of this effect say nothing of any other."""
+        return np.zeros(len(measured), bool)
+
+    def reading(self, seen):
+        """What this effect of `of_record` explains beside a simulation: `Reading`, or None.
+
+        Parameters
+        ----------
+        seen : diagnosis.judgement.Seen
+        """
+        return None
+
+    @classmethod
+    def recognised(cls, seen, shown):
+        """This cause as what is left of a record shows it.
+
+        Parameters
+        ----------
+        seen : diagnosis.judgement.Seen
+        shown : Effect or None
+            What `of_record` found.
+
+        Returns
+        -------
+        tuple of Effect and Reading, or None
+        """
+        reading = shown.reading(seen) if shown is not None else None
+        return (shown, reading) if reading is not None else None
+
+    @classmethod
+    def acts_on(cls, core):
+        """Whether a sensor with this core can have this cause: motion and spring need a mass."""
+        return isinstance(core, Oscillator) or (
+            cls.change_core is Effect.change_core and cls.add_force is Effect.add_force)
+
+    def pure_delay_s(self):
+        """Time [s] by which this effect moves the signal as it is."""
+        return 0.0
+
+    def clock_ratio(self):
+        """Time that passes while the stamps advance by one second."""
+        return 1.0
+
+    def time_steps(self):
+        """Instants [s] of the sensor's clock at which its stamps jump, and by how much [s] each.
+
+        From there on, the value stamped t belongs to t less that.
+        """
+        return ()
+
+    def change_core(self, core):
+        """Core as this effect leaves it."""
+        return core
+
+    def add_force(self, force):
+        """`StaticForce` of the core's spring as this effect leaves it."""
+        return force
+
+    def base_gain(self, time_s):
+        """Gain of the base's acceleration before the core, at times [s] since the record's start.
+
+        A number or an array of the times' shape.
+        """
+        return 1.0
+
+    def change_motion(self, motion):
+        """What this effect passes on of the core's motion, both shape (n,), finely sampled.
+
+        It begins at rest. Of effects at the stage `CORE` that depend on the path.
+        """
+        return motion
+
+    def transfer_function(self, s):
+        """Linear link's transfer function at complex `s` [rad/s], without its pure delay."""
+        return np.ones_like(s, dtype=complex)
+
+    def limits(self):
+        """Lowest and highest value that can come out."""
+        return -np.inf, np.inf
+
+    def reference_gain(self):
+        """Gain of the link on its plateau."""
+        return 1.0
+
+    def poles(self):
+        """Poles of the link [rad/s]."""
+        return np.array([])
+
+    def zeros(self):
+        """Zeros of the link [rad/s]."""
+        return np.array([])
+
+    def simulate(self, values, circumstances):
+        """Samples of one axis after this effect.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n,)
+            Samples before it.
+        circumstances : Circumstances
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+        return values
+
+    def invert(self, values, variance, circumstances):
+        """Samples before this effect and their variance; the inverse of `simulate`.
+
+        Parameters
+        ----------
+        values, variance : ndarray, shape (n,)
+            Samples after it, and the variance of their noise (0 where it is not known).
+        circumstances : Circumstances
+
+        Returns
+        -------
+        values, variance : ndarray, shape (n,)
+        """
+        return values, variance
+
+    def live(self, sampling_rate_hz):
+        """This effect on one stream of samples, for simulation and for inversion.
+
+        An effect with memory returns a new object whose `simulate` and `invert` take consecutive
+        blocks and remember; results must not depend on where the blocks are cut. Everything runs
+        through it, a whole record as one block.
+
+        Parameters
+        ----------
+        sampling_rate_hz : float
+        """
+        return self
+
+    def share_of_axes(self, axis):
+        """Share of each axis's output, shape (3,), in that of an axis (0, 1, 2), itself included.
+
+        Of effects at the stage `CROSS_AXIS`.
+        """
+        return np.eye(3)[axis]
+
+    @classmethod
+    def simulate_axes(cls, values, by_axis, circumstances):
+        """Samples of all axes after this cause.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n, 3)
+            Samples before it.
+        by_axis : dict of int to Effect
+            The effect of this cause on each axis that has it.
+        circumstances : Circumstances
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+        """
+        result = values.copy()
+        for axis, effect in by_axis.items():
+            result[:, axis] = effect.simulate(values[:, axis], circumstances)
+        return result
+
+    @classmethod
+    def invert_axes(cls, values, variance, by_axis, circumstances):
+        """Samples of all axes before this cause and their variance, both (n, 3)."""
+        values, variance = values.copy(), variance.copy()
+        for axis, effect in by_axis.items():
+            values[:, axis], variance[:, axis] = effect.invert(
+                values[:, axis], variance[:, axis], circumstances)
+        return values, variance
+
+
+def require_oscillator(core, cause):
+    """The core; raise ModelError where it is not an oscillator."""
+    if not isinstance(core, Oscillator):
+        raise ModelError(f"effects: {cause} given with a core of type {core.type}, expected an "
+                         "oscillator")
+    return core

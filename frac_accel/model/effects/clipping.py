@@ -1,0 +1,74 @@
+"""Range that the output cannot leave."""
+
+import dataclasses
+
+import numpy as np
+
+from ...errors import ModelError
+from ..parameters import parameter
+from .base import CLIPPING, Effect, Reading
+
+# Share of a limit from which values are near it, how many of them tell, and factor by which what is
+# left there may be larger than elsewhere.
+_NEAR = 0.8
+_TELL = 20
+_LARGER = 3.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Clipping(Effect):
+    """Values beyond the limits come out as the limits."""
+
+    cause = "clipping"
+    read_off = True
+    stage = CLIPPING
+    explanation = "Values beyond the sensor's range are cut off."
+    experiment = "Repeat at half the level: nothing is cut then, and the output follows again."
+
+    lower: float = parameter("output units")
+    upper: float = parameter("output units")
+
+    def __post_init__(self):
+        if not self.lower < self.upper:
+            raise ModelError(f"effects: clipping from {self.lower:g} to {self.upper:g} given, "
+                             "expected lower below upper")
+
+    @classmethod
+    def of_record(cls, found, measured):
+        if found.lower is None and found.upper is None:
+            return None
+        beyond = 1e3 * float(np.max(np.abs(measured)))
+        return cls(-beyond if found.lower is None else found.lower,
+                   beyond if found.upper is None else found.upper)
+
+    def spoiled(self, measured):
+        return (measured <= self.lower) | (measured >= self.upper)
+
+    def reading(self, seen):
+        """All samples count: nothing was fitted to those at a limit.
+
+        None where the values bend before they come to a limit: nothing is cut off then.
+        """
+        if self._bends(seen):
+            return None
+        resolution = (seen.found.step or 0.0) / np.sqrt(12)
+        return Reading({"lower": resolution, "upper": resolution},
+                       (seen.measured - seen.output)[seen.rows],
+                       (seen.measured - self.simulate(seen.output, None))[seen.rows],
+                       "; ".join(words for words in seen.found.words if "limit" in words))
+
+    def _bends(self, seen):
+        free = seen.used & ~self.spoiled(seen.measured)
+        near = free & ((seen.measured <= _NEAR * self.lower)
+                       | (seen.measured >= _NEAR * self.upper))
+        away = free & ~near
+        if near.sum() < _TELL or away.sum() < _TELL:
+            return False
+        error = seen.measured - seen.output
+        return np.std(error[near]) > _LARGER * np.std(error[away])
+
+    def simulate(self, values, circumstances):
+        return np.clip(values, self.lower, self.upper)
+
+    def limits(self):
+        return self.lower, self.upper

@@ -1,0 +1,140 @@
+"""Short and strong interference."""
+
+import dataclasses
+
+import numpy as np
+
+from ..parameters import parameter
+from .base import INTERFERENCE, Effect, Reading
+
+# Largest share of the time that counts as bursts, and how much louder than the noise they are.
+_MOST = 0.3
+_LOUDER = 3.0
+# Logarithm of the likelihood by which two noises must describe the residual better than one.
+_BETTER = 50.0
+# How many bursts there must be at least, and the chance that a sample after one that sticks out
+# does so too: spikes and heavy tails come alone.
+_FEWEST = 5
+_GOES_ON = 0.2
+# Correlation of the bursts, and of the error in them, with the motion, above which they are its: so
+# much more than chance gives, and at most so much.
+_UNRELATED = 0.15
+_AT_MOST = 0.5
+# Share of the samples in bursts that may repeat the one before them: a sensor that is stuck.
+_REPEATED = 0.5
+_PASSES = 60
+_WINDOW = 5
+
+
+@dataclasses.dataclass(frozen=True)
+class InterferenceBursts(Effect):
+    """Noise from elsewhere, in bursts for a share of the time, with this RMS within them."""
+
+    cause = "interference_bursts"
+    read_off = True
+    stage = INTERFERENCE
+    explanation = "Bursts of strong noise from elsewhere are added to the output."
+    experiment = ("Record at rest: the bursts are still there; switch off motors, radios and "
+                  "supplies nearby one at a time.")
+
+    share: float = parameter("1", minimum=0, below=1, null=0.0)
+    rms: float = parameter("output units", minimum=0, null=0.0)
+
+    def invert(self, values, variance, circumstances):
+        """The values as they are, with the variance that a burst adds on average."""
+        return values, variance + self.share * self.rms**2
+
+    @classmethod
+    def recognised(cls, seen, shown):
+        """A mixture of two noises, the louder one in stretches that the motion does not explain."""
+        error = (seen.measured - seen.output)[seen.used]
+        output = seen.output[seen.used]
+        if len(error) < 10 * _WINDOW:
+            return None
+        noise, loud, share, better = _two_noises(error)
+        if not 0 < share < _MOST or loud < _LOUDER**2 * noise or better < _BETTER:
+            return None
+        inside = _in_bursts(error, noise, loud, share)
+        starts = np.flatnonzero(np.diff(np.r_[0, inside.astype(int)]) == 1)
+        if len(starts) < _FEWEST or _going_on(error, noise) < _GOES_ON \
+                or _follows(inside, error, output, len(starts)) \
+                or _repeated(seen.measured[seen.used], inside) > _REPEATED:
+            return None
+        length = inside.sum() / len(starts)
+        rms = float(np.sqrt(loud - noise))
+        stds = {"share": float(np.sqrt(share * (1 - share) * max(2 * length, 1) / len(error))),
+                "rms": rms / np.sqrt(2 * share * len(error)) * loud / (loud - noise)}
+        after = np.where(inside, error * np.sqrt(noise / loud), error)
+        return cls(float(share), rms), Reading(stds, error, after, (
+            f"{len(starts)} bursts of {length:.3g} samples on average, "
+            f"{np.sqrt(loud / noise):.3g} times as loud as the rest, whatever the motion does"))
+
+
+def _two_noises(error):
+    """Variances and the louder one's share of a normal mixture, and how much better it fits.
+
+    A. P. Dempster, N. M. Laird, D. B. Rubin, *J. R. Stat. Soc. B* 39 (1977) 1-38.
+    """
+    squares = error**2
+    quiet = np.median(squares) / 0.4549  # that of a squared normal variable
+    loud, share = max(10 * quiet, np.quantile(squares, 0.99)), 0.05
+    for _ in range(_PASSES):
+        weight = _weight(squares, quiet, loud, share)
+        share = weight.mean()
+        if share < 1e-6 or share > 0.999:
+            return quiet, loud, 0.0, 0.0
+        quiet = np.sum((1 - weight) * squares) / np.sum(1 - weight)
+        loud = np.sum(weight * squares) / np.sum(weight)
+    one = -0.5 * len(error) * (1 + np.log(squares.mean()))
+    two = np.sum(np.logaddexp(np.log1p(-share) - 0.5 * (np.log(quiet) + squares / quiet),
+                              np.log(share) - 0.5 * (np.log(loud) + squares / loud)))
+    return quiet, loud, share, float(two - one)
+
+
+def _weight(squares, quiet, loud, share):
+    """Chance that each sample belongs to the louder noise."""
+    odds = (np.log(share / (1 - share)) + 0.5 * np.log(quiet / loud)
+            + 0.5 * squares * (1 / quiet - 1 / loud))
+    return 1 / (1 + np.exp(-np.clip(odds, -500, 500)))
+
+
+def _in_bursts(error, quiet, loud, share):
+    """Which samples lie in a burst, by the power of a few neighbours."""
+    mean = np.convolve(error**2, np.full(_WINDOW, 1 / _WINDOW), "same")
+    odds = (np.log(share / (1 - share)) + 0.5 * _WINDOW * (
+        np.log(quiet / loud) + mean * (1 / quiet - 1 / loud)))
+    # of the neighbours, one loud one alone is none
+    near = error**2 > 9 * quiet
+    several = np.convolve(near, np.ones(_WINDOW), "same") >= 2
+    return (odds > 0) & several
+
+
+def _going_on(error, quiet):
+    """Chance that a sample sticks out where the one before it does."""
+    out = error**2 > 9 * quiet
+    return out[1:][out[:-1]].mean() if out[:-1].any() else 0.0
+
+
+def _follows(inside, error, output, count):
+    """Whether the bursts or the error in them have to do with the motion."""
+    slope = np.gradient(output)
+    bend = np.gradient(slope)
+    # as many stretches as long as a burst could be one, and as many in them are independent
+    stretches, samples = count / inside.mean(), max(inside.sum() / _WINDOW, count)
+    moving = output - output.mean()
+    for values in (moving, slope, bend):
+        if abs(np.corrcoef(values**2, inside)[0, 1]) > _allowed(stretches):
+            return True
+        if abs(np.corrcoef(values[inside], error[inside])[0, 1]) > _allowed(samples):
+            return True
+    return False
+
+
+def _allowed(count):
+    """Largest correlation of what is unrelated, by as many independent values."""
+    return min(_UNRELATED + 3 / np.sqrt(count), _AT_MOST)
+
+
+def _repeated(measured, inside):
+    """Share of the samples in bursts that repeat the one before."""
+    return np.mean(np.diff(measured, prepend=np.nan)[inside] == 0)

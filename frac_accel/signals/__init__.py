@@ -1,0 +1,1 @@
+"""Operations on plain arrays: filters, spectra, errors; they know no model."""

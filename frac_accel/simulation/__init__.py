@@ -1,0 +1,364 @@
+"""Simulation of a sensor model from a sampled reference."""
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from ..errors import FracAccelError, ModelError
+from ..io.samples import Samples
+from ..model import AXES, SensorModel
+from ..model.core import Arx
+from ..model.effects.base import CORE, GAIN, Circumstances
+from ..record.sources import is_bag
+from ..signals.convolution import Convolution, at_positions
+from .modes import modes_of
+
+# Factor by which the response of a linear sensor is refined before it is read between samples.
+_REFINED = 4
+# A nonlinear core is stepped this often in each sampling interval, and three times as often in each
+# natural period.
+_STEPS_PER_SAMPLE = 8
+_MOST_STEPS_PER_SAMPLE = 64
+# Points in each sampling interval at which a path is followed: a turn of the largest motion must be
+# known far better than the smallest play.
+_PATH_STEPS = 16
+# With fewer steps the modes of a fractional memory need not be finer.
+_FEW_STEPS = 4
+# Samples that a response between samples needs after the last one.
+_BEYOND = 8
+
+
+def simulate(model: SensorModel, reference: Any, sampling_rate_hz: float | None = None,
+             axis: str | None = None, initial: str = "rest", temperature_c: Any = None) -> Any:
+    """Output of a sensor, from the acceleration of its base.
+
+    Parameters
+    ----------
+    model : SensorModel
+    reference : array_like, shape (n, 3) or (n,), or str or Path
+        Acceleration [m/s²] at uniform instants; one column needs `axis`. Or a bag, of which the
+        default topic of the reference is taken.
+    sampling_rate_hz : float, optional
+        Needed by an array.
+    axis : {"x", "y", "z"}, optional
+        The axis of a one-column reference. The other two axes are then at rest.
+    initial : {"rest", "steady"}
+        Motion before the record: none, or the first sample's value for ever (gravity).
+    temperature_c : array_like, shape (n,) or (), optional
+        Temperature [°C]; needed by a model with temperature_sensitivity.
+
+    Returns
+    -------
+    ndarray, same shape as `reference`, or Samples of a bag
+        Output in the sensor's units at the same instants. Lost samples and scattering stamps
+        change no value.
+
+    Raises
+    ------
+    FracAccelError
+        If the reference is not finite, empty or of the wrong shape, rate or temperature are
+        missing, or the motion of a nonlinear model grows without bound.
+    ModelError
+        If an ``arx`` core holds at a lower rate than the record's.
+
+    Notes
+    -----
+    See `AxisSimulator`.
+
+    Examples
+    --------
+    >>> import numpy as np, frac_accel
+    >>> from frac_accel.model.core import Oscillator
+    >>> model = frac_accel.SensorModel(Oscillator(200.0, 0.5, sensitivity=2.0))
+    >>> steady = frac_accel.simulate(model, np.full(100, 9.81), 1000.0, "x", initial="steady")
+    >>> round(float(steady[-1]), 3)
+    19.62
+    """
+    if is_bag(reference):
+        return _of_bag(model, reference, initial, temperature_c)
+    if sampling_rate_hz is None:
+        raise FracAccelError("sampling_rate_hz: missing, expected the rate of the reference in Hz")
+    values = np.asarray(reference, float)
+    single = values.ndim == 1
+    if single:
+        if axis not in tuple(AXES):
+            raise FracAccelError(f"axis: {axis!r} given for a reference of one column, "
+                                 "expected x, y or z")
+        column = AXES.index(axis)
+        values = np.zeros((len(values), 3))
+        values[:, column] = reference
+    if values.ndim != 2 or values.shape[1] != 3 or not len(values):
+        raise FracAccelError(f"reference: shape {np.shape(reference)} given, expected (n, 3)")
+    result = np.empty_like(values)
+    for i, axis_model in enumerate(model.axes):
+        simulator = AxisSimulator(values[:, i], sampling_rate_hz, temperature_c, initial=initial)
+        result[:, i] = simulator.respond(axis_model)
+    result = model.live_simulation(sampling_rate_hz)(result, simulator.circumstances)
+    return result[:, column] if single else result
+
+
+def _of_bag(model, bag, initial, temperature_c):
+    from ..io.bag import REFERENCE_TOPIC, read_bag
+    from ..record.record import UniformSamples
+    samples = read_bag(bag, [REFERENCE_TOPIC])[REFERENCE_TOPIC]
+    record = UniformSamples.of(samples, f"{bag}: topic {REFERENCE_TOPIC}")
+    output = simulate(model, record.values, record.sampling_rate_hz, initial=initial,
+                      temperature_c=temperature_c)[record.slot]
+    return Samples.of(samples.stamps_ns[record.index], output, frame_id=samples.frame_id)
+
+
+class AxisSimulator:
+    """Simulates models of one axis again and again on the same reference.
+
+    Parameters
+    ----------
+    reference : array_like, shape (n,)
+        Acceleration [m/s²] at uniform instants.
+    sampling_rate_hz : float
+    temperature_c : array_like, shape (n,) or (), optional
+        Temperature [°C].
+    start_time_s : float
+        Time [s] from the record's start to the first sample: drifts, tones and skewed clocks count
+        from there.
+    initial : {"steady", "rest"}
+        Motion before the first sample: its value for ever (gravity), or none.
+    lag_s : float
+        Time [s] by which the output's instants are later than the reference's.
+    steps_per_sample : int
+        Steps of a nonlinear core in each sampling interval. Half as many leave an error about ten
+        times as large.
+
+    Attributes
+    ----------
+    circumstances : Circumstances
+        Times and temperatures of the samples.
+
+    Notes
+    -----
+    The linear part is the exact convolution with the band-limited reference (`Convolution`). What
+    a nonlinear spring does comes on top as a deviation, which the modes of the oscillator
+    follow step by step between the samples (`core.nonlinear_motion`), and which then passes
+    through the links behind the core. As in a sampled record, harmonics above the Nyquist
+    frequency fold back.
+    """
+
+    def __init__(self, reference, sampling_rate_hz, temperature_c=None, start_time_s=0.0,
+                 initial="steady", steps_per_sample=_STEPS_PER_SAMPLE, lag_s=0.0):
+        values = np.asarray(reference, float)
+        if values.ndim != 1 or not len(values):
+            raise FracAccelError(f"reference: shape {values.shape} given, expected (n,)")
+        if not np.isfinite(values).all():
+            first = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise FracAccelError(f"reference: sample {first} is not finite")
+        if not np.isfinite(sampling_rate_hz) or sampling_rate_hz <= 0:
+            raise FracAccelError(f"sampling_rate_hz: {sampling_rate_hz} given, expected above 0")
+        if initial not in ("rest", "steady"):
+            raise FracAccelError(f"initial: {initial!r} given, expected rest or steady")
+        self._rate = float(sampling_rate_hz)
+        self._n = len(values)
+        self._level = values[0] if initial == "steady" else 0.0
+        self._moving = values - self._level
+        self._still = not self._moving.any()
+        self._start_time_s = start_time_s
+        self._least_steps = steps_per_sample
+        self._lag_s = lag_s
+        self._convolution, self._room_s = None, 0.0
+        self._transfers, self._motions, self._deviations = {}, {}, {}
+        self.circumstances = Circumstances(start_time_s + np.arange(self._n) / self._rate,
+                                           _temperature(temperature_c, self._n))
+
+    def simulate(self, axis_model):
+        """Output of an `AxisModel`, without the cross-axis part.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+
+        Raises
+        ------
+        FracAccelError, ModelError
+            As `simulate`.
+        """
+        values = self.respond(axis_model)
+        for effect in axis_model.effects:
+            values = effect.live(self._rate).simulate(values, self.circumstances)
+        return values
+
+    def respond(self, axis_model):
+        """Output of the core and its links, delay and clock: before the effects on the samples."""
+        if axis_model.changes_base:
+            gain = axis_model.base_gain(self.circumstances.time_s + self._lag_s)
+            return self._with_base(gain * (self._moving + self._level))._respond(axis_model)
+        return self._respond(axis_model)
+
+    def _with_base(self, reference):
+        """The same simulator for another acceleration of the base."""
+        return AxisSimulator(reference, self._rate, self.circumstances.temperature_c,
+                             self._start_time_s, "steady" if self._level else "rest",
+                             self._least_steps, self._lag_s)
+
+    def _respond(self, axis_model):
+        result, late_s = self._late(axis_model, 0.0), 0.0
+        for at_s, step_s in axis_model.time_steps:
+            late_s += step_s
+            result = np.where(self.circumstances.time_s >= at_s, self._late(axis_model, late_s),
+                              result)
+        return result
+
+    def _late(self, axis_model, late_s):
+        """Response with a further delay."""
+        core = axis_model.effective_core
+        if isinstance(core, Arx) and self._rate > core.sampling_rate_hz * (1 + 1e-6):
+            raise ModelError(f"core.sampling_rate_hz: the model holds at {core.sampling_rate_hz:g} "
+                             f"Hz, the record has {self._rate:g} Hz")
+        ratio = axis_model.clock_ratio
+        # what the clock is off already at the start is a delay like any other
+        delay_s = axis_model.delay_s + late_s - self._lag_s - (ratio - 1) * self._start_time_s
+        result = self._linear(axis_model, delay_s, ratio)
+        force = axis_model.static_force
+        if (force or axis_model.path_dependent) and not (self._still and not self._level):
+            result += self._deviation(axis_model, force, delay_s, ratio)
+        return result
+
+    def _linear(self, model, delay_s, ratio):
+        level = self._level * static_gain(model) if self._level else 0.0
+        if self._still:
+            return np.full(self._n, level)
+        convolution = self._prepared(delay_s)
+        transfer = self._transfer(model.dynamics)
+        if delay_s:
+            transfer = transfer * kept(self._transfers, delay_s, _shift, convolution.s, delay_s)
+        if ratio == 1:
+            return convolution.response(transfer) + level
+        position = ratio * np.arange(self._n)
+        count = int(max(position[-1], self._n)) + _BEYOND
+        fine = convolution.response_between(transfer, _REFINED, _REFINED * count)
+        return at_positions(fine, _REFINED * position) + level
+
+    def _deviation(self, model, force, delay_s, ratio):
+        """What the spring's force beyond its linear part adds, and what depends on the path."""
+        try:
+            from . import nonlinear_motion
+        except ImportError as error:
+            raise FracAccelError(f"a model with a nonlinear spring or friction needs numba to be "
+                                 f"simulated: pip install numba ({error})") from None
+        core = model.effective_core
+        natural = 2 * np.pi * core.natural_frequency_hz if force else 0.0
+        highest = natural / (2 * np.pi) * np.sqrt(1 + force.slope)
+        wanted = self._least_steps * max(1.0, 3 * highest / self._rate)
+        if model.path_dependent:
+            wanted = max(wanted, _PATH_STEPS)
+        steps = int(np.ceil(min(wanted, _MOST_STEPS_PER_SAMPLE)))
+        position = ratio * np.arange(self._n) - delay_s * self._rate
+        count = int(max(position[-1], self._n)) + _BEYOND
+        self._prepared(delay_s)
+        links = (core, *(effect for effect in model.dynamics[1:] if effect.stage < CORE))
+        load = self._level * core.sensitivity if force else 0.0
+        orders = nonlinear_motion.derivatives_needed(force) + 1 if force else 1
+        known_by = links, natural, orders, steps, count
+        motion, modes = kept(self._motions, known_by, self._core_motion, *known_by, most=1)
+        start, deviation = 0.0, np.zeros(motion.shape[1])
+        if force:
+            start = force.equilibrium(load) - load
+            deviation = kept(self._deviations, (known_by, force), nonlinear_motion.deviation,
+                             modes, force, natural / (self._rate * steps), motion, start,
+                             natural * self._start_time_s)
+        if not np.isfinite(deviation[-1]):
+            raise FracAccelError("the model's motion grows without bound: its nonlinear terms are "
+                                 "too large for this record")
+        for effect in model.path_dependent:
+            passed = motion[0] + deviation
+            deviation = deviation + effect.change_motion(passed) - passed
+        behind = [effect for effect in model.dynamics[1:] if effect.stage > CORE]
+        moving = deviation - start
+        filtering = [effect for effect in behind if effect.stage < GAIN]
+        if filtering:
+            conditioner = Convolution(moving, self._rate * steps)
+            moving = conditioner.response(_product(filtering, conditioner.s))
+        gain = _product([effect for effect in behind if effect.stage >= GAIN], np.array([1j]))
+        start *= _static_gain(lambda s: _product(filtering, s)) if start else 0.0
+        if delay_s or ratio != 1:
+            moving = at_positions(moving, steps * position)
+        else:
+            moving = moving[:steps * self._n:steps]
+        return gain[0].real * (moving + start)
+
+    def _core_motion(self, links, natural, orders, steps, count):
+        """Linear motion and its derivatives by the time natural * t, shape (orders, n); modes."""
+        convolution, transfer = self._convolution, self._transfer(links)
+        motion = np.empty((orders, steps * count))
+        for order in range(orders):
+            motion[order] = convolution.response_between(transfer, steps, steps * count)
+            if order < orders - 1:
+                transfer = transfer * (convolution.s / natural)
+        if self._level:
+            motion[0] += self._level * _static_gain(lambda s: _product(links, s))
+        if not natural:
+            return motion, None
+        return motion, modes_of(links[0], self._rate / count,
+                                natural + np.pi * self._rate * steps,
+                                coarse=self._least_steps < _FEW_STEPS)
+
+    def _transfer(self, links):
+        """Composite transfer function of some links, a core first, where the convolution is."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return functools.reduce(np.multiply, [
+                kept(self._transfers, link, link.transfer_function, self._convolution.s)
+                for link in links])
+
+    def _prepared(self, delay_s):
+        """Convolution with room for a delay."""
+        if self._convolution is None or abs(delay_s) > self._room_s:
+            self._transfers, self._motions, self._deviations = {}, {}, {}
+            self._room_s = max(abs(delay_s), 64 / self._rate)
+            self._convolution = Convolution(self._moving, self._rate, self._room_s)
+        return self._convolution
+
+
+def kept(store, key, make, *arguments, most=8):
+    """What `make` returns, from the dict `store` if it is there; the last few used stay there."""
+    if key in store:
+        store[key] = store.pop(key)
+    else:
+        while len(store) >= most:
+            del store[next(iter(store))]
+        store[key] = make(*arguments)
+    return store[key]
+
+
+def _shift(s, delay_s):
+    return np.exp(-s * delay_s)
+
+
+def static_gain(model):
+    """Response to a constant acceleration [output units per m/s²]; 0 behind a high-pass."""
+    return _static_gain(model.transfer_function)
+
+
+def _static_gain(transfer):
+    # the limit, since orders below zero and high-passes make s = 0 itself undefined
+    gain = transfer(np.array([1e-9 + 0j]))[0]
+    size = np.abs(transfer(2j * np.pi * np.geomspace(1e-3, 1e5, 200)))
+    largest = np.max(size[np.isfinite(size)], initial=0.0)
+    # without bound where a high-pass is undone: what went before is then not in the record
+    bounded = np.isfinite(gain) and abs(gain) < 1e6 * largest
+    return float(gain.real) if bounded and abs(gain) > 1e-6 * largest else 0.0
+
+
+def _product(links, s):
+    """Composite transfer function of some links."""
+    total = np.ones(len(s), complex)
+    for link in links:
+        total *= link.transfer_function(s)
+    return total
+
+
+def _temperature(values, n):
+    if values is None:
+        return None
+    values = np.asarray(values, float)
+    if values.shape not in ((), (n,)) or not np.isfinite(values).all():
+        raise FracAccelError(f"temperature_c: shape {values.shape} given, expected one finite "
+                             f"number or {n} of them")
+    return np.broadcast_to(values, n)

@@ -1,0 +1,249 @@
+"""How good a model is on a measured pair: its simulation, and the correction that it gives."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..correction.design import plateau
+from ..errors import FracAccelError
+from ..identification.response.excitation import excited_band
+from ..io.samples import Samples
+from ..model import AXES, SensorModel
+from ..record import Record
+from ..record.sources import pair_of
+from ..shown import Shown
+from ..signals.metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
+from ..signals.thinning import envelope
+from ..simulation import simulate
+from ..streaming import Corrector
+from .reference import restored
+
+# A stamp that has been moved by a skew and back.
+_ROUNDING_NS = 2
+
+
+@dataclasses.dataclass(frozen=True)
+class Comparison:
+    """Errors of raw and corrected samples of one axis against the reference.
+
+    Attributes
+    ----------
+    raw, scaled, corrected : ErrorMetrics
+        Of the raw samples as they are, divided by the model's sensitivity, and corrected.
+    stamps_ns, reference, before, after : ndarray, shape (n,)
+        What was compared: instants, the reference there, scaled raw and corrected samples.
+    """
+
+    raw: ErrorMetrics
+    scaled: ErrorMetrics
+    corrected: ErrorMetrics
+    stamps_ns: np.ndarray
+    reference: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class Validation(Shown):
+    """Errors of a model and of its correction on one axis of a measured pair.
+
+    Attributes
+    ----------
+    simulation : ErrorMetrics
+        Of the simulated against the measured output.
+    comparison : Comparison
+        Of raw and corrected samples against the reference.
+    filters : dict
+        Summary of the inverse filters.
+    counters : dict of str to int
+        Fate of the samples.
+    """
+
+    simulation: ErrorMetrics
+    comparison: Comparison
+    filters: dict
+    counters: dict
+
+    def __repr__(self):
+        return (f"<Validation: simulation {self.simulation.total.nrmse:.3%}, correction "
+                f"{self.comparison.corrected.total.nrmse:.3%} (NRMSE)>")
+
+    def _draw(self, figure):
+        seen = self.comparison
+        time = (seen.stamps_ns - seen.stamps_ns[0]) * 1e-9
+        upper, lower = figure.subplots(2, sharex=True)
+        for axes, signals in ((upper, {"reference": seen.reference, "corrected": seen.after}),
+                              (lower, {"raw / sensitivity": seen.before - seen.reference,
+                                       "corrected": seen.after - seen.reference})):
+            for name, values in signals.items():
+                axes.plot(*envelope(time, values), label=name, linewidth=0.8)
+            axes.legend(loc="upper right")
+        upper.set_ylabel("acceleration [m/s²]")
+        lower.set(xlabel="time [s]", ylabel="error [m/s²]")
+
+    def as_dict(self):
+        """Plain numbers, without the compared signals."""
+        return {"simulation": self.simulation.as_dict(),
+                **{name: getattr(self.comparison, name).as_dict()
+                   for name in ("raw", "scaled", "corrected")},
+                "filters": self.filters, "counters": self.counters}
+
+
+def validate(source: Any, model: SensorModel, axis: str = "x",
+             temperature_at: Callable | None = None, sampling_rate_hz: float | None = None,
+             **wishes: Any) -> Validation:
+    """Judge a model on a measured pair, the reference without the model's `reference_faults`.
+
+    Parameters
+    ----------
+    source : str, Path or tuple
+        A bag, or (reference, sensor) as `Samples` or as arrays of shape (n,) or (n, 3).
+    model : SensorModel
+    axis : {"x", "y", "z"}
+    temperature_at : callable, optional
+        Temperature [°C] at an array of stamps [ns], for models that depend on it.
+    sampling_rate_hz : float, optional
+        Of arrays [Hz].
+    **wishes
+        ``sample_rate_hz``, ``bandwidth_hz``, ``max_delay_s``, ``lowest_hz`` as for `Corrector`.
+
+    Returns
+    -------
+    Validation
+
+    Raises
+    ------
+    FracAccelError
+        If the pair cannot be compared.
+
+    Examples
+    --------
+    >>> import frac_accel
+    >>> model = frac_accel.SensorModel.load("bags/soft_mount.yaml")
+    >>> judged = frac_accel.validate("bags/soft_mount.mcap", model)
+    >>> judged.simulation.total.nrmse > 0.1  # the model in use lacks two effects
+    True
+    """
+    reference, sensor = pair_of(source, sampling_rate_hz, axis)
+    reference = restored(reference, sensor, model, axis, temperature_at)
+    pair = Record.of(reference, sensor, axis)
+    corrector = Corrector(model, **wishes)
+    parts = [*_corrected(corrector, sensor, temperature_at), corrector.finish()]
+    stamps, values = (np.concatenate([getattr(part, name) for part in parts])
+                      for name in ("stamps_ns", "values"))
+    if corrector.design is None:
+        raise FracAccelError("the stamps of the sensor's samples tell no rate: most samples are "
+                             "missing between them")
+    if not len(stamps):
+        raise FracAccelError(f"{len(sensor.stamps_ns)} samples are fewer than the filter needs to "
+                             f"warm up ({corrector.design.warm_up_samples})")
+    comparison = compare(reference, sensor, Samples.of(stamps, values), corrector.design, axis)
+    bands = [band.band_hz for band in comparison.corrected.bands]
+    measured, simulated = _simulated(model, pair, AXES.index(axis), temperature_at)
+    return Validation(
+        simulation=error_metrics(measured, simulated, pair.sampling_rate_hz, bands),
+        comparison=comparison, filters=corrector.design.summary(), counters=corrector.counters)
+
+
+def compare(reference, sensor, corrected, design, axis="x"):
+    """Errors of raw and corrected samples against the reference.
+
+    Parameters
+    ----------
+    reference, sensor, corrected : Samples
+    design : FilterDesign
+        That of the correction.
+    axis : {"x", "y", "z"}
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    FracAccelError
+        If the records have too little in common.
+    """
+    column = AXES.index(axis)
+    pair = Record.of(reference, sensor, axis)
+    *known, known_rate = _known_reference(pair)
+    rate = pair.topics[1].clock.rate_hz if "sensor" in pair.resampled else pair.sampling_rate_hz
+    # the raw sample of a corrected one still has the sensor's delay and skew in its stamp
+    raw_stamps = corrected.stamps_ns + design.sensor_delay_ns
+    since_start = raw_stamps - sensor.stamps_ns[0]
+    skew = 1 / design.model.axes[0].clock_ratio - 1
+    raw_stamps = raw_stamps + np.round(skew * since_start).astype(np.int64)
+    place = np.minimum(np.searchsorted(sensor.stamps_ns, raw_stamps - _ROUNDING_NS),
+                       len(sensor.stamps_ns) - 1)
+    ahead = round(1e9 * pair.taken_out_s)
+    truth = interpolate(*known, corrected.stamps_ns - ahead, known_rate)[:, column]
+    truth_raw = interpolate(*known, raw_stamps - ahead, known_rate)[:, column]
+    run = _longest_run(np.isfinite(truth) & np.isfinite(truth_raw)
+                       & (np.abs(sensor.stamps_ns[place] - raw_stamps) <= _ROUNDING_NS),
+                       corrected.stamps_ns, rate)
+    truth, truth_raw, stamps = truth[run], truth_raw[run], corrected.stamps_ns[run]
+    raw, after = sensor.values[place[run], column], corrected.values[run, column]
+    low, high = excited_band(pair.reference[:, column], pair.sensor[:, column], rate)
+    band = design.axes[column].band_hz
+    low, high = max(low, band[0]), min(high, band[1], pair.band_hz or np.inf)
+    if low >= high:
+        raise FracAccelError("the reference has no power in the band of the correction, "
+                             f"{band[0]:.4g} Hz to {band[1]:.4g} Hz")
+    bands = octave_bands(low, high)
+    scaled = raw / plateau(design.model.axis(axis), design.model.band_hz)
+    return Comparison(
+        raw=error_metrics(truth_raw, raw, rate, bands),
+        scaled=error_metrics(truth_raw, scaled, rate, bands),
+        corrected=error_metrics(truth, after, rate, bands),
+        stamps_ns=stamps, reference=truth, before=scaled, after=after)
+
+
+def _known_reference(pair):
+    """Stamps and values of the reference, and their rate: as published, or as resampled."""
+    if "reference" not in pair.resampled:
+        topic = pair.topics[0]
+        return topic.stamps_ns, topic.values, topic.clock.rate_hz
+    grid = np.round(np.arange(len(pair)) * 1e9 / pair.sampling_rate_hz).astype(np.int64)
+    return pair.start_ns + grid, pair.reference, pair.sampling_rate_hz
+
+
+def _corrected(corrector, sensor, temperature_at):
+    """Parts of the corrected record; the temperature follows the stamps once a second."""
+    step = len(sensor.stamps_ns)
+    if temperature_at is not None:
+        step = max(1, round(step / max(1.0, 1e-9 * np.ptp(sensor.stamps_ns))))
+    for start in range(0, len(sensor.stamps_ns), step):
+        stamps, values, variance = (column[start:start + step] for column in sensor[:3])
+        if temperature_at is not None:
+            corrector.set_temperature(float(temperature_at(stamps).mean()))
+        yield corrector.process(stamps, values, variance)
+
+
+def _simulated(model, pair, column, temperature_at):
+    """Measured and simulated output at the same instants."""
+    temperature = None
+    if temperature_at is not None:
+        seconds = pair.taken_out_s + np.arange(len(pair)) / pair.sampling_rate_hz
+        temperature = temperature_at(pair.start_ns + 1e9 * seconds)
+    simulated = simulate(model, pair.reference, pair.sampling_rate_hz, initial="steady",
+                         temperature_c=temperature)
+    at = np.arange(len(pair)) / pair.sampling_rate_hz
+    instants = np.round(1e9 * at).astype(np.int64)
+    shifted = interpolate(instants, simulated, instants + round(1e9 * pair.lag_s),
+                          pair.sampling_rate_hz)[:, column]
+    run = _longest_run(np.isfinite(shifted) & pair.valid, instants, pair.sampling_rate_hz)
+    return pair.sensor[run, column], shifted[run]
+
+
+def _longest_run(good, stamps_ns, rate):
+    """Slice of the longest run of good samples without a gap."""
+    follows = np.r_[False, np.diff(stamps_ns) < 1.5e9 / rate]
+    breaks = np.flatnonzero(~(good & follows & np.r_[False, good[:-1]]))
+    edges = np.r_[breaks, len(good)]
+    longest = int(np.argmax(np.diff(edges)))
+    if not good.any():
+        raise FracAccelError("no sample of the sensor lies within the time of the reference")
+    start = edges[longest]
+    return slice(int(start) if good[start] else int(start) + 1, int(edges[longest + 1]))

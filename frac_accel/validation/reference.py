@@ -1,0 +1,61 @@
+"""The motion behind a recorded reference that has faults of its own."""
+
+import numpy as np
+
+from ..io.samples import Samples
+from ..model import AXES
+from ..record import Record
+from ..signals.convolution import Convolution
+from ..simulation import simulate, static_gain
+
+
+def restored(reference, sensor, model, axis="x", temperature_at=None):
+    """Reference without the `reference_faults` of a model.
+
+    What a high-pass has taken away for good, a constant and a slow drift, is taken from the
+    sensor: those with which the simulated output comes nearest to the measured one.
+
+    Parameters
+    ----------
+    reference, sensor : Samples
+    model : SensorModel
+    axis : {"x", "y", "z"}
+        The axis whose sensor tells the drift; the others keep theirs.
+    temperature_at : callable, optional
+        Temperature [°C] at an array of stamps [ns].
+
+    Returns
+    -------
+    Samples
+        At uniform instants; the reference itself where the model names no faults.
+
+    Raises
+    ------
+    FracAccelError
+        If no pair can be made of the samples.
+    """
+    if not model.reference_faults:
+        return reference
+    pair = Record.of(reference, sensor, axis)
+    rate, column = pair.sampling_rate_hz, AXES.index(axis)
+    time = np.arange(len(pair)) / rate
+    values = np.empty_like(pair.reference)
+    for i, recorded in enumerate(pair.reference.T):
+        convolution = Convolution(recorded - recorded[0], rate)
+        transfer = np.ones_like(convolution.s)
+        for fault in model.reference_faults:
+            transfer = transfer * fault.transfer_function(convolution.s)
+        values[:, i] = convolution.response(transfer) + recorded[0]
+    early_s = -sum(fault.pure_delay_s() for fault in model.reference_faults)
+    gain = static_gain(model.axis(axis))
+    if gain and any(pole == 0 for fault in model.reference_faults for pole in fault.poles()):
+        celsius = temperature_at(pair.start_ns + np.round(1e9 * time)) if temperature_at else None
+        output = simulate(model, values, rate, initial="steady", temperature_c=celsius)[:, column]
+        # the sensor's instants are later than the restored reference's
+        output = np.interp(time + pair.lag_s + early_s, time, output)
+        drift = np.stack([np.ones(len(time)), time / time[-1]], axis=1)
+        lost = np.linalg.lstsq(drift[pair.valid], (pair.sensor[:, column] - output)[pair.valid],
+                               rcond=None)[0]
+        values[:, column] += drift @ lost / gain
+    stamps = pair.start_ns + np.round(1e9 * (time - early_s)).astype(np.int64)
+    return Samples.of(stamps, values, frame_id=reference.frame_id)

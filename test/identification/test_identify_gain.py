@@ -1,0 +1,53 @@
+"""A sensor far below its resonance is a gain, and a smoothed reference makes it no resonance."""
+
+import numpy as np
+import pytest
+from exact_sines import oscillator, record, samples
+
+from frac_accel import diagnose, identify
+from frac_accel.model.core import Gain, Oscillator
+from frac_accel.record import Record
+
+
+def pair_of(seed, sensor, reference=np.ones_like, **options):
+    return Record.of(*samples(*record(np.random.default_rng(seed), sensor, reference,
+                                      **{"noise": 1e-2, **options})), "x")
+
+
+@pytest.mark.parametrize("structure", ["gain", "auto", "classical"])
+def test_gain_delay_and_offset(structure):
+    """Far below a resonance at 5 kHz, which no fit to 60 Hz can see."""
+    rng = np.random.default_rng(2)
+    gain, delay = rng.uniform(0.5, 2), rng.uniform(0, 5e-3)
+    found = identify(pair_of(3, lambda s: gain * oscillator(s, 5000.0, 0.7) * np.exp(-s * delay),
+                             band=(0.5, 60.0)), "x", structure)
+    assert found.structure == "gain" and isinstance(found.model.core, Gain)
+    value = {name: (entry["value"], entry["std"]) for name, entry in found.parameters.items()}
+    assert abs(value["sensitivity"][0] - gain) < 4 * value["sensitivity"][1]
+    # the damping of a resonance out of sight is a delay of 2 zeta / w0
+    assert abs(value["delay_s"][0] - delay - 1.4 / (2 * np.pi * 5000)) < 4 * value["delay_s"][1]
+    assert abs(value["offset"][0]) < 4 * value["offset"][1]
+
+
+@pytest.mark.parametrize("corner_hz", [30.0, 60.0])
+def test_a_smoothed_reference_makes_no_resonance(corner_hz):
+    found = identify(pair_of(4, np.ones_like, lambda s: 1 / (1 + s / (2 * np.pi * corner_hz)),
+                             band=(0.5, 20.0)), "x", "classical")
+    assert isinstance(found.model.core, Gain)
+    assert "open" in found.reason
+
+
+def test_a_resonance_in_the_band_stays_one():
+    found = identify(pair_of(5, lambda s: oscillator(s, 150.0, 0.4), band=(0.5, 250.0)), "x",
+                     "classical")
+    assert isinstance(found.model.core, Oscillator)
+    assert found.parameters["natural_frequency_hz"]["value"] == pytest.approx(150, rel=1e-3)
+
+
+def test_a_diagnosis_without_a_model_begins_with_the_gain():
+    reference, sensor = record(np.random.default_rng(6), lambda s: 1.2 * np.exp(-s * 3e-3),
+                               band=(0.5, 60.0), noise=1e-2)
+    found = diagnose(samples(reference, sensor))
+    assert [finding.cause for finding in found.findings] == ["time_delay"]
+    assert found.findings[0].effect.delay_s == pytest.approx(3e-3, abs=1e-5)
+    assert isinstance(found.model.core, Gain)

@@ -1,0 +1,54 @@
+"""The example policy has what the nodes' source asks of DDS, and nobody else may change a model."""
+
+import re
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+POLICY = ElementTree.parse(ROOT / "config" / "sros2_policy.xml").getroot()
+
+
+def allowed(node, kind, way):
+    return {entry.text for profile in POLICY.iter("profile") if profile.get("node") == node
+            for group in profile.iter(f"{kind}s") if group.get(way) == "ALLOW"
+            for entry in group.iter(kind)}
+
+
+def named_in(*files):
+    text = "".join((ROOT / "frac_accel" / file).read_text() for file in files)
+    return set(re.findall(r'"((?:imu|accel)/[a-z_]+)"', text))
+
+
+def test_the_corrector_may_use_its_topics():
+    named = named_in("nodes/corrector.py")
+    assert {"imu/data_raw", "imu/data"} <= named
+    may = allowed("corrector", "topic", "subscribe") | allowed("corrector", "topic", "publish")
+    assert named <= may
+    assert {"diagnostics", "corrector/metrics/*"} <= allowed("corrector", "topic", "publish")
+    assert "imu/data_raw" not in allowed("corrector", "topic", "publish")
+
+
+def test_the_virtual_sensor_may_use_its_topics():
+    may = (allowed("virtual_sensor", "topic", "subscribe")
+           | allowed("virtual_sensor", "topic", "publish"))
+    assert named_in("nodes/virtual_sensor.py") <= may
+
+
+def test_only_maintenance_may_change_a_model():
+    asking = {profile.get("node") for profile in POLICY.iter("profile")
+              for group in profile.iter("services") if group.get("request") == "ALLOW"
+              for service in group.iter("service")
+              if re.search("set_parameters|reload_model", service.text)}
+    assert asking == {"maintenance"}
+    assert {"~/set_parameters", "~/reload_model"} <= allowed("corrector", "service", "reply")
+
+
+def test_every_pin_has_a_hash_and_pip_asks_for_them():
+    for name in ("venv", "oldest"):
+        text = (ROOT / "requirements" / f"{name}.txt").read_text()
+        pins = re.findall(r"^[A-Za-z0-9][^\n]*==[^\n]*(?:\n    --hash=sha256:[0-9a-f]{64}[^\n]*)*",
+                          text, re.M)
+        assert len(pins) > 20 and all("--hash=sha256:" in pin for pin in pins)
+    recipes = [line for line in (ROOT / "Makefile").read_text().splitlines()
+               if "pip install" in line and "--editable" not in line]
+    assert len(recipes) >= 3 and all("--require-hashes" in line for line in recipes)

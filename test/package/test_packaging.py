@@ -1,0 +1,222 @@
+"""The package builds, installs and starts as on a ROS machine, and imports only what it may."""
+
+import ast
+import configparser
+import importlib.metadata
+import json
+import os
+import re
+import runpy
+import subprocess
+import sys
+import sysconfig
+import xml.etree.ElementTree
+from pathlib import Path
+
+import pytest
+import yaml
+
+from frac_accel.model import SensorModel
+
+ROOT = Path(__file__).parents[2]
+NODES = ("corrector", "player", "recorder", "virtual_sensor")
+
+
+def run(command, **kwargs):
+    """Run `command` from the repository and return what it did, its output as text."""
+    kwargs = {"cwd": ROOT, "capture_output": True, "text": True, "timeout": 120} | kwargs
+    return subprocess.run(command, **kwargs)
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """Prefix of a fresh colcon build of the package."""
+    pytest.importorskip("colcon_core")
+    folder = tmp_path_factory.mktemp("colcon")
+    result = run(
+        [Path(sys.prefix, "bin", "colcon"), "--log-base", folder / "log", "build",
+         "--build-base", folder / "build", "--install-base", folder / "install"],
+        env=os.environ | {"AMENT_PREFIX_PATH": sys.prefix})
+    assert result.returncode == 0, result.stdout + result.stderr
+    return folder / "install" / "frac_accel"
+
+
+def start(installed, command):
+    """Run `command` in a shell that knows nothing but the built workspace's ``setup.bash``."""
+    environment = {"HOME": os.environ["HOME"], "PATH": "/usr/bin:/bin",
+                   "ROS_DOMAIN_ID": "111", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    return run(["bash", "-c", f"source '{installed.parent}/setup.bash' && exec {command}"],
+               cwd="/", env=environment)
+
+
+@pytest.mark.ros
+def test_every_file_is_installed(installed):
+    for folder in ("launch", "config"):
+        for source in (ROOT / folder).rglob("*"):
+            if source.is_file() and source.parent.name != "__pycache__":
+                copy = installed / "share" / "frac_accel" / source.relative_to(ROOT)
+                assert copy.read_bytes() == source.read_bytes()
+    packages, = installed.glob("lib/python3*/site-packages")
+    for source in (ROOT / "frac_accel").rglob("*"):
+        if source.suffix in (".py", ".msg", ".yaml", ".html"):
+            assert (packages / source.relative_to(ROOT)).is_file()
+    share = installed / "share"
+    assert (share / "frac_accel" / "package.xml").is_file()
+    assert (share / "ament_index/resource_index/packages/frac_accel").is_file()
+
+
+@pytest.mark.ros
+def test_nodes_are_where_ros2_run_looks_and_only_the_command_is_on_path(installed):
+    executables = {path.name for path in (installed / "lib" / "frac_accel").iterdir()}
+    assert executables == {"frac_accel", *NODES}
+    assert [path.name for path in (installed / "bin").iterdir()] == ["frac_accel"]
+
+
+@pytest.mark.ros
+def test_command_runs_from_the_workspace(installed):
+    result = start(installed, "frac_accel --help")
+    assert result.returncode == 0, result.stderr
+    assert "identify" in result.stdout
+
+
+@pytest.mark.ros
+def test_corrector_refuses_a_missing_model_in_one_line(installed):
+    result = start(
+        installed,
+        f"{installed}/lib/frac_accel/corrector --ros-args -p model_file:=/nowhere/model.yaml "
+        f"--params-file {installed}/share/frac_accel/config/corrector.yaml")
+    assert result.returncode == 2, result.stderr
+    assert "/nowhere/model.yaml" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def imported_by(modules):
+    """Top-level packages of site-packages whose files a new interpreter loads for `modules`."""
+    code = ("import json, sys; before = set(sys.modules); "
+            f"import {', '.join(modules)}; "
+            "loaded = [sys.modules[name] for name in set(sys.modules) - before]; "
+            "print(json.dumps([getattr(module, '__file__', None) for module in loaded]))")
+    result = run([sys.executable, "-c", code])
+    assert result.returncode == 0, result.stderr
+    files = [Path(file) for file in json.loads(result.stdout) if file]
+    site = Path(sysconfig.get_path("purelib"))
+    return {file.relative_to(site).parts[0] for file in files if site in file.parents}
+
+
+def ros_packages():
+    """Top-level packages of the ROS wheels."""
+    return {package for package, names in importlib.metadata.packages_distributions().items()
+            if any(re.match("ros-(?!parser)", name) for name in names)}
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("node", ["corrector", "virtual_sensor"])
+def test_live_nodes_import_only_what_a_stock_jazzy_has(node):
+    allowed = {"numpy", "scipy", "yaml", "_yaml"}
+    assert not imported_by([f"frac_accel.nodes.{node}"]) - allowed - ros_packages()
+
+
+def test_numerical_code_imports_no_ros():
+    code = ROOT / "frac_accel"
+    modules = [
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        for path in sorted(code.rglob("*.py"))
+        if code / "nodes" not in path.parents and path.name != "__main__.py"
+    ]
+    packages = imported_by(modules)
+    assert "numpy" in packages
+    assert not packages & ({"rclpy", "sensor_msgs", "std_msgs"} | ros_packages())
+
+
+def declared_arguments(tree, function):
+    """First arguments of the calls to `function` in a syntax tree."""
+    return {node.args[0].value for node in ast.walk(tree)
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == function}
+
+
+def node_calls(tree):
+    """Executable and names of the own parameters of every ``Node(...)`` in a syntax tree."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Node":
+            keywords = {keyword.arg: keyword.value for keyword in node.keywords}
+            names = [key.value for element in keywords["parameters"].elts
+                     if isinstance(element, ast.Dict) for key in element.keys]
+            yield keywords["executable"].value, names
+
+
+@pytest.mark.parametrize("name", ["bench.launch.py", "vehicle.launch.py"])
+def test_launch_file_uses_each_argument_that_it_declares(name):
+    tree = ast.parse((ROOT / "launch" / name).read_text())
+    declared = declared_arguments(tree, "DeclareLaunchArgument")
+    assert declared == declared_arguments(tree, "LaunchConfiguration")
+    executables = {executable for executable, _ in node_calls(tree)}
+    assert executables and executables <= set(NODES)
+
+
+def test_on_a_vehicle_a_corrector_that_has_died_is_started_again():
+    tree = ast.parse((ROOT / "launch" / "vehicle.launch.py").read_text())
+    given, = ({keyword.arg: keyword.value for keyword in call.keywords} for call in ast.walk(tree)
+              if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "Node")
+    assert {"name", "use_sim_time", "temperature_topic"} <= declared_arguments(
+        tree, "DeclareLaunchArgument")
+    assert ast.literal_eval(given["executable"]) == "corrector"
+    assert ast.literal_eval(given["respawn"]) is True
+    assert ast.literal_eval(given["respawn_delay"]) <= 2.0
+
+
+@pytest.mark.parametrize("name", ["bench.launch.py", "vehicle.launch.py"])
+def test_launch_file_is_a_description(name):
+    pytest.importorskip("launch_ros", reason="launch comes with an installed ROS only")
+    namespace = runpy.run_path(ROOT / "launch" / name)
+    assert len(namespace["generate_launch_description"]().entities) > 1
+
+
+@pytest.mark.parametrize("node", NODES)
+def test_launch_and_config_set_only_parameters_of_the_node(node):
+    given = set()
+    for path in (ROOT / "launch").glob("*.launch.py"):
+        for executable, names in node_calls(ast.parse(path.read_text())):
+            given |= set(names) if executable == node else set()
+    for path in (ROOT / "config").glob("*.yaml"):
+        document = yaml.safe_load(path.read_text())
+        for section in (f"/**/{node}", *(["/**"] if node == "corrector" else [])):
+            own = document.get(section, {}).get("ros__parameters", {})
+            given |= set(own).difference(own.get("sensors", ()))
+    folder = ROOT / "frac_accel" / "nodes"
+    sources = [folder / f"{node}.py", folder / "_filtered_topic.py",
+               folder / "_sensor_parameters.py"]
+    literals = {part.value for path in sources for part in ast.walk(ast.parse(path.read_text()))
+                if isinstance(part, ast.Constant)}
+    # what every node of rclpy has
+    assert given and given <= literals | {"use_sim_time", "qos_overrides"}
+
+
+def test_example_models_load():
+    examples = sorted((ROOT / "config" / "models").glob("*.yaml"))
+    assert len(examples) >= 2
+    for path in examples:
+        assert len(SensorModel.load(path).axes) == 3
+
+
+def test_layouts_plot_raw_reference_and_corrected():
+    foxglove = json.loads((ROOT / "config" / "foxglove_layout.json").read_text())
+    paths = {path["value"] for panel in foxglove["configById"].values()
+             for path in panel.get("paths", [])}
+    tree = xml.etree.ElementTree.parse(ROOT / "config" / "plotjuggler_layout.xml")
+    curves = {curve.get("name") for curve in tree.iter("curve")}
+    assert {path.replace(".", "/") for path in paths} == curves
+    for topic in ("/imu/data_raw", "/imu/reference", "/imu/data"):
+        assert f"{topic}/linear_acceleration/x" in curves
+
+
+def test_version_is_the_same_everywhere():
+    version = xml.etree.ElementTree.parse(ROOT / "package.xml").findtext("version")
+    assert f'version="{version}"' in (ROOT / "setup.py").read_text()
+    assert f"\n{version} (" in (ROOT / "CHANGELOG.rst").read_text()
+
+
+def test_scripts_go_where_ros2_run_looks():
+    config = configparser.ConfigParser()
+    config.read(ROOT / "setup.cfg")
+    assert config["install"]["install_scripts"] == "$base/lib/frac_accel"
+    assert config["develop"]["script_dir"] == "$base/lib/frac_accel"

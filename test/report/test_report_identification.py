@@ -1,0 +1,99 @@
+"""`identify --report` tells what `identify` found, and refuses early what it could not write."""
+
+import base64
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from frac_accel import SensorModel, identify
+from frac_accel.cli import main
+from frac_accel.errors import ModelError
+from frac_accel.record import Record
+from frac_accel.report.identification import identification_page
+from frac_accel.report.quantity import percent, rounded
+from frac_accel.uncertainty import response_uncertainty
+
+BAG = Path(__file__).resolve().parents[2] / "bags" / "viscoelastic_bench.mcap"
+
+
+def traces(text):
+    """All traces of a page."""
+    for content in re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', text):
+        yield from json.loads(content)["data"]
+
+
+def values(entry):
+    """Numbers of a trace, which plotly 6 and newer writes in base64."""
+    if isinstance(entry, dict):
+        return np.frombuffer(base64.b64decode(entry["bdata"]), entry["dtype"])
+    return np.array(entry, float)
+
+
+@pytest.mark.parametrize("structure", ["fractional", "arx"])
+def test_page_tells_what_was_found(tmp_path, structure):
+    files = {name: str(tmp_path / name) for name in ("m.yaml", "r.html", "r.json")}
+    assert main(["identify", str(BAG), "--axis", "y", "--structure", structure, "-o",
+                 files["m.yaml"], "--report", files["r.html"], "--json", files["r.json"]]) == 0
+    found = json.loads(Path(files["r.json"]).read_text())
+    text = Path(files["r.html"]).read_text()
+    for name, entry in found["parameters"].items():
+        value, std = rounded(entry["value"], entry["std"])
+        assert re.search(rf"<td[^>]*>{name}</td><td[^>]*>{re.escape(value)}</td>"
+                         rf"<td[^>]*>{re.escape(std or '–')}</td>", text)
+    assert found["reason"] in text
+    tests, excited = found["validation"]["residual"], found["excitation"]
+    assert f"{tests['independence_statistic']:.1f}" in text
+    assert f"{excited['crest_factor']:.3g}" in text and f"{excited['loudest_rms']:.4g}" in text
+    assert all(f"{band['nrmse']:.2%}" in text for band in found["validation"]["held_out_bands"])
+    known = response_uncertainty(SensorModel.load(files["m.yaml"]), [10.0, 200.0], "y")
+    band = next(trace for trace in traces(text) if trace["name"] == "95 % interval")
+    # the outline: along the upper limit, and back along the lower one
+    (x, back), (high, low) = (np.split(values(band[axis]), 2) for axis in "xy")
+    shown = np.stack([np.interp([10.0, 200.0], back[::-1], low[::-1]),
+                      np.interp([10.0, 200.0], x, high)], axis=1)
+    np.testing.assert_allclose(shown, known.amplitude_interval, rtol=1e-3)
+    for part in (found["model"]["provenance"]["sha256"], BAG.name, "--axis y",
+                 f"{found['nrmse']:.3%}", f"{found['held_out_nrmse']:.3%}"):
+        assert part in text
+
+
+@pytest.mark.parametrize("report, expected", [
+    ("nowhere/r.html", "does not exist"), ("bag.mcap", "is the input")])
+def test_report_that_cannot_be_written_is_refused_before_the_work(tmp_path, capsys, report,
+                                                                  expected):
+    (tmp_path / "bag.mcap").write_bytes(BAG.read_bytes())
+    assert main(["identify", str(tmp_path / "bag.mcap"), "-o", str(tmp_path / "m.yaml"),
+                 "--report", str(tmp_path / report)]) == 2
+    line, = capsys.readouterr().err.strip().splitlines()
+    assert expected in line
+    assert not (tmp_path / "m.yaml").exists()
+
+
+@pytest.mark.parametrize("value, std, expected", [
+    (180.0032658, 0.00941, ("180.0033", "0.0094")),
+    (1234567.0, 4321.0, ("1234600", "4300")),
+    (1.5, 0.0996, ("1.50", "0.10")),
+    (0.00060005847, 2.4e-7, ("6.0006e-04", "0.0024e-04")),
+    (0.0, 0.0, ("0", "")), (3.25, float("nan"), ("3.25", "")), (-2.5, 12.0, ("-2", "12"))])
+def test_values_end_where_their_uncertainty_begins(value, std, expected):
+    assert rounded(value, std) == expected
+
+
+def test_percent():
+    assert [percent(share) for share in (0.000213, 0.05, 1.094)] == ["0.021 %", "5 %", "109 %"]
+
+
+def test_page_without_interval_says_why(tmp_path, monkeypatch):
+    """What `response_uncertainty` raises where hardly a draw of the parameters is a sensor."""
+    def refuse(*_):
+        raise ModelError("covariance: the data have not determined the parameters")
+
+    monkeypatch.setattr("frac_accel.report.identification.response_uncertainty", refuse)
+    pair = Record.load(BAG, axis="y")
+    result = identify(pair, axis="y", structure="oscillator")
+    identification_page(result, pair, "y", {}).write(tmp_path / "r.html")
+    text = (tmp_path / "r.html").read_text()
+    assert "without an interval: covariance: the data have not determined" in text
