@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import BagError, FracAccelError
 from ..io import cdr
+from ..io.motion import MovedMotion
 from ..io.samples import Samples
 from .live_simulation import LiveSimulator
 
@@ -67,7 +68,7 @@ class SampleMessages:
     """Messages of one sample each.
 
     Every output is the input message that it belongs to, with stamp, acceleration and covariance
-    replaced.
+    replaced, and the rest of the motion taken to the new instant (`MovedMotion`).
 
     Parameters
     ----------
@@ -90,6 +91,7 @@ class SampleMessages:
         self._frame_id = frame_id
         self.malformed = 0
         self._type_name = type_name
+        self._motion = MovedMotion(type_name)
         self._plain = plain
         self._count = 0
         self._waiting = {}
@@ -112,6 +114,8 @@ class SampleMessages:
         if len(self._waiting) > _FORGET_AT:
             self._waiting = {index: self._waiting[index] for index in self.stream.waiting.tolist()}
         messages = [message for message, _ in given]
+        if given:
+            messages = self._motion.moved(messages, self.stream.design.sensor_delay_ns)
         if self._frame_id:
             messages = [cdr.with_frame(message, self._frame_id) for message in messages]
         messages = cdr.replace_samples(self._type_name, messages, filtered.stamps_ns,
