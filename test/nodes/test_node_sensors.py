@@ -192,7 +192,7 @@ def test_the_console_says_what_is_done_and_what_is_wrong(models):
             probe.until(lambda: any("x/raw/std" in values for _, values in metrics),
                         lambda: metrics)
         assert node.stop() == 0
-    assert "samples 800" in node.output[-1]
+    assert "/imu/data_raw: samples" in node.output[-1]
     stamp_ns, values = metrics[-1]
     assert abs(stamp_ns - time.time_ns()) < 60e9
     assert all(np.isfinite(float(value)) for value in values.values())
@@ -213,7 +213,9 @@ def test_a_missing_clock_and_stamps_of_zero_are_named_soon(models):
         source = probe.publisher(Imu, "/imu/data_raw")
         raw = samples(1)
         zeros = cdr.encode_samples(cdr.IMU, raw._replace(stamps_ns=np.zeros_like(raw.stamps_ns)))
-        start_s = time.monotonic()
+        before = len(probe.statuses)
         with background(publish, [(source, zeros[:40])], 10.0):
             probe.status("the stamps on /imu/data_raw are zero")
-            assert time.monotonic() - start_s < 2.0
+        named = ["are zero" in status.message for status in probe.statuses[before:]]
+        # there is one each second
+        assert named.index(True) <= 1
