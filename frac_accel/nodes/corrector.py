@@ -106,7 +106,8 @@ class Corrector(FracAccelNode):
         is_one = not any(names)
         declare_sensor(self)
         self.declare("allow_model_changes", True,
-                     "whether model_file and the wishes for the filter may change while it runs")
+                     "whether model_file, the wishes for the filter and the sensors may change "
+                     "while it runs")
         self.declare("design_deadline_s", 10.0,
                      "longest time that loading another model and designing its filter may take",
                      minimum=0.5, maximum=600.0)
@@ -124,6 +125,10 @@ class Corrector(FracAccelNode):
         if sorted(set(edges)) != list(edges) or edges[0] < 0:
             raise NodeError("parameter 'metrics_bands_hz' must be ascending frequencies, got "
                             f"{list(edges)}")
+
+    def _check_changes(self):
+        if not self.value("allow_model_changes"):
+            raise NodeError("allow_model_changes is false: the sensors stay as at the start")
 
     @staticmethod
     def _check_name(name, others):
@@ -166,6 +171,7 @@ class Corrector(FracAccelNode):
         given = {each.name: parameter_value_to_python(each.value) for each in request.parameters}
         name = given.pop("name", "")
         try:
+            self._check_changes()
             self._check_name(name, [name, *self.sensors])
         except NodeError as error:
             response.result = _result(str(error))
@@ -190,9 +196,13 @@ class Corrector(FracAccelNode):
     def _on_remove(self, request, response):
         names = [parameter_value_to_python(each.value) for each in request.parameters
                  if each.name == "name"]
-        if len(names) != 1 or names[0] not in self.sensors:
-            response.result = _result(f"name: {names} given, expected one of "
-                                      f"{', '.join(self.sensors) or 'none'}")
+        try:
+            self._check_changes()
+            if len(names) != 1 or names[0] not in self.sensors:
+                raise NodeError(f"name: {names} given, expected one of "
+                                f"{', '.join(self.sensors) or 'none'}")
+        except NodeError as error:
+            response.result = _result(str(error))
             return response
         sensor = self.sensors.pop(names[0])
         sensor.finish()

@@ -160,6 +160,16 @@ def test_sensors_come_and_go_at_run_time(tmp_path, models):
     assert_same(rear, second, "imu")
 
 
+def test_where_nothing_may_change_no_sensor_comes_or_goes(tmp_path, models):
+    arguments = parameters_file(tmp_path, sensors=["front"], model_file=str(models[0]),
+                                allow_model_changes=False)
+    with ros_domain() as environment, Probe(environment) as probe, \
+            NodeProcess("corrector", environment, {}, *arguments):
+        for service, name in (("add_sensor", "rear"), ("remove_sensor", "front")):
+            result = request(probe, service, name=name)
+            assert not result.successful and "allow_model_changes" in result.reason
+
+
 @pytest.mark.parametrize("parameters, words", [
     ({"sensors": ["front", "front"]}, "two sensors"),
     ({"sensors": ["front axle"]}, "front axle"),
