@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from ..errors import FracAccelError
 from . import machine
 from .figures import Figure
 from .live import (
@@ -108,6 +109,8 @@ def idle_cores(command, seconds=10.0):
         time.sleep(4.0)
         cpu_s, start_s = machine.cpu_time_s(node.pid), time.monotonic()
         time.sleep(seconds)
+        if node.poll() is not None:
+            raise FracAccelError("the corrector has ended")
         return (machine.cpu_time_s(node.pid) - cpu_s) / (time.monotonic() - start_s)
 
 

@@ -52,10 +52,14 @@ class FracAccelNode(Node):
         super().__init__(name)
 
     def warn_of_unknown_parameters(self) -> None:
-        """Name what the user has set and the node does not know, once all is declared."""
-        declared = [name for name in self._parameters if not name.startswith("qos_overrides.")]
-        for name in self._parameter_overrides:
-            if name in self._parameters or name.startswith("qos_overrides."):
+        """Name what the user has set and the node does not know, once all is declared.
+
+        What has been set is not documented in rclpy; where it cannot be had, nothing is said.
+        """
+        declared = [name for name in self.list_parameters([], 0).names
+                    if not name.startswith("qos_overrides.")]
+        for name in getattr(self, "_parameter_overrides", ()):
+            if self.has_parameter(name) or name.startswith("qos_overrides."):
                 continue
             near = difflib.get_close_matches(name, declared, 1)
             hint = f": did you mean '{near[0]}'?" if near else ""
@@ -136,6 +140,7 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
+        node.warn_of_unknown_parameters()
         executor = make_executor()
         executor.add_node(node)
         direct, next_s = DirectIntake(node), 0.0

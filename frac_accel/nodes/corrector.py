@@ -65,7 +65,6 @@ class Corrector(FracAccelNode):
         self.is_running = True
         for sensor in self.sensors.values():
             self.get_logger().info(sensor.describe())
-        self.warn_of_unknown_parameters()
         # A collection over all that has been imported takes as long as a hundred samples.
         gc.collect()
         gc.freeze()
