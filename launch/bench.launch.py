@@ -1,5 +1,8 @@
 """A bag through the corrector into another bag: player, corrector, recorder; ends with the bag.
 
+The exit status is not 0 where the bag could not be played. ``rate:=0.0`` plays as fast as the
+corrector takes it; nothing is lost.
+
 With ``simulate:=true`` the virtual sensor makes the raw signal from the bag's reference, and the
 bag's own raw signal is played as ``/imu/data_raw_measured``.
 
@@ -54,6 +57,13 @@ def generate_launch_description():
         ],
         remappings=[("/imu/data_raw", raw_of_bag)],
     )
+
+    def on_end(event, _):
+        if event.returncode:
+            # what ends a launch with another exit status than 0
+            raise RuntimeError(f"the bag was not played: exit status {event.returncode}")
+        return [TimerAction(period=DRAIN_S, actions=[Shutdown(reason="the bag has been played")])]
+
     return LaunchDescription([
         DeclareLaunchArgument("bag", description="bag to play: .mcap file or rosbag2 folder"),
         DeclareLaunchArgument("model", description="sensor model (YAML)"),
@@ -62,13 +72,9 @@ def generate_launch_description():
         DeclareLaunchArgument("rate", default_value="1.0", description="playback rate"),
         DeclareLaunchArgument("simulate", default_value="false", choices=["true", "false"],
                               description="make the raw signal from the reference"),
+        RegisterEventHandler(OnProcessExit(target_action=player, on_exit=on_end)),
         recorder,
         virtual_sensor,
         corrector,
         player,
-        RegisterEventHandler(OnProcessExit(
-            target_action=player,
-            on_exit=[TimerAction(
-                period=DRAIN_S, actions=[Shutdown(reason="the bag has been played")])],
-        )),
     ])

@@ -16,7 +16,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from frac_accel.nodes._runtime import RawSubscription
+from frac_accel.nodes._intake import RawSubscription
 
 RELIABLE = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE)
 BEST_EFFORT = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -75,6 +75,14 @@ class Probe:
         for topic in topics:
             values = self.figures.setdefault(topic, [])
             self.node.create_subscription(Float64, topic, lambda m, v=values: v.append(m.data), 10)
+
+    def metrics(self, topic):
+        """List that grows with stamp [ns] and values, a dict, of each message of metrics."""
+        found = []
+        self.node.create_subscription(DiagnosticArray, topic, lambda array: found.extend(
+            (array.header.stamp.sec * 10**9 + array.header.stamp.nanosec,
+             {pair.key: pair.value for pair in status.values}) for status in array.status), 10)
+        return found
 
     def publisher(self, message_class, topic, qos=RELIABLE, subscriptions=1):
         """Publisher that has found its subscriptions."""

@@ -18,6 +18,7 @@ SUITES = {
     "uncertainty": "the variance by the model's parameters, beside PyDynamic",
     "bag": "correct on a bag of a million messages, beside the mcap library",
     "live": "the corrector over DDS, beside relays; needs rclpy",
+    "sensors": "a vehicle's rates, and many sensors in one process; needs rclpy",
 }
 
 
@@ -39,12 +40,14 @@ def run(arguments):
     if arguments.rounds < 1:
         raise FracAccelError(f"--rounds: {arguments.rounds} given, expected at least 1")
     names, notes = arguments.suites or list(SUITES), []
-    if "live" in names and importlib.util.find_spec("rclpy") is None:
+    for name in {"live", "sensors"}.intersection(names):
+        if importlib.util.find_spec("rclpy") is not None:
+            continue
         if arguments.suites:
-            raise FracAccelError("suite live needs rclpy (pip install ros-jazzy-rclpy[fastrtps] "
+            raise FracAccelError(f"suite {name} needs rclpy (pip install ros-jazzy-rclpy[fastrtps] "
                                  "ros-jazzy-common-interfaces, or a sourced ROS 2)")
-        names.remove("live")
-        notes.append("live: not measured, rclpy is not installed")
+        names.remove(name)
+        notes.append(f"{name}: not measured, rclpy is not installed")
     if "uncertainty" in names and importlib.util.find_spec("PyDynamic") is None:
         notes.append("uncertainty: PyDynamic is not installed, nothing to compare with")
     from ..bench.figures import table

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import BagError
 from ..io.bag import CORRECTED_TOPIC, BagWriter, cdr
+from ..io.motion import MovedMotion
 from ..model import SensorModel
 from ..streaming import Corrector
 from ._common import (
@@ -120,6 +121,7 @@ class _Sink:
         self._corrector, self._writer = corrector, writer
         self._temperatures = collections.deque(temperatures)
         self._type, self._topic = type_name, topic
+        self._motion = MovedMotion(type_name)
         self._waiting = collections.deque()
         self._first = 0
         self._frame = ""
@@ -161,6 +163,7 @@ class _Sink:
         passed = [self._waiting.popleft() for _ in range(indices[-1] + 1 - self._first)]
         messages, logs = zip(*[passed[index - self._first] for index in indices])
         self._first = indices[-1] + 1
+        messages = self._motion.moved(messages, self._corrector.design.sensor_delay_ns)
         patched = cdr.replace_samples(self._type, messages, ready.stamps_ns, ready.values,
                                       ready.variance)
         self._writer.write_many(self._topic, list(zip(patched, logs, logs)))

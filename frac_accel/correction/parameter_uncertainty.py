@@ -106,7 +106,7 @@ class ParameterUncertaintyState:
     """
 
     def __init__(self, design, level):
-        self._states = [FilterState(one, level) for one in design.filters]
+        self._states = [FilterState(one, level, _TOLERANCE) for one in design.filters]
         self._states += [None] * (len(design.constants) - len(self._states))
         self._added = list(zip(design.constants.tolist(), design.shares.tolist()))
         self._constant_variance = design.constant_variance

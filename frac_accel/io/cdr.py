@@ -54,6 +54,8 @@ _FIELDS: dict[str, dict[str, _Field]] = {
 }
 _BODY_SIZE = {IMU: 296, ACCEL_STAMPED: 48, TEMPERATURE: 16}
 _DIAGONAL = slice(0, 9, 4)
+# So few messages are taken apart one by one.
+_FEW = 4
 _LITTLE_ENDIAN_HEADER = b"\x00\x01\x00\x00"
 _FLOAT64 = 8  # sensor_msgs/PointField datatype
 _MAX_RELATIVE_TIME_S = 1e9
@@ -96,7 +98,12 @@ def split_stamps(stamps_ns) -> tuple[np.ndarray, np.ndarray]:
 
 def read_samples(type_name: str, messages: Sequence[bytes]) -> Samples:
     """Samples of serialised messages of one of `ACCELERATION_TYPES`; `BagError` if malformed."""
-    alike = _alike(type_name, messages) if messages and type_name in SAMPLE_TYPES else None
+    if messages and type_name in SAMPLE_TYPES:
+        if len(messages) <= _FEW and (places := _places_of(type_name, messages)):
+            return _few_samples(places, messages)
+        alike = _alike(type_name, messages)
+    else:
+        alike = None
     if alike:
         return _samples_of(*alike)
     return read_samples_at(type_name, *_joined(messages))
@@ -214,6 +221,11 @@ def encode_temperatures(temperatures: Temperatures) -> list[bytes]:
     ]
 
 
+def encode_float64(value: float) -> bytes:
+    """A serialised ``std_msgs/Float64``."""
+    return _LITTLE_ENDIAN_HEADER + struct.pack("<d", value)
+
+
 def patch_samples(
     type_name: str,
     messages: Sequence[bytes],
@@ -241,6 +253,8 @@ def replace_samples(
 
     It becomes diagonal, or all zeros (unknown) where the variance of an axis is NaN.
     """
+    if 0 < len(messages) <= _FEW and (places := _places_of(type_name, messages)):
+        return _few_replaced(places, messages, stamps_ns, values, variance)
     variance = np.asarray(variance, dtype=np.float64)
     if variance.size and np.isnan(variance.min()):
         known = ~np.isnan(variance).any(axis=1, keepdims=True)
@@ -312,6 +326,14 @@ def restamped(message: bytes, stamp_ns: int) -> bytes:
     order = read_header(message).byte_order
     sec, nanosec = split_stamps(stamp_ns)
     return message[:4] + struct.pack(order + "iI", int(sec), int(nanosec)) + message[12:]
+
+
+def with_frame(message: bytes, frame_id: str) -> bytes:
+    """A message of one of `SAMPLE_TYPES` with another frame."""
+    header = read_header(message)
+    frame = frame_id.encode() + b"\0"
+    start = message[:12] + struct.pack(f"{header.byte_order}I", len(frame)) + frame
+    return start + bytes(-(len(start) - 4) % 8) + message[header.body_offset:]
 
 
 def read_point_cloud(message: bytes) -> Samples:
@@ -450,6 +472,83 @@ def _alike(type_name: str, messages: Sequence[bytes]) -> tuple[np.ndarray, str] 
     ):
         return None
     return records, frame_id
+
+
+class _Places(NamedTuple):
+    """Where the parts of a message are, for `struct`."""
+
+    stamp: struct.Struct
+    acceleration: int
+    covariance: int | None
+    three: struct.Struct
+    nine: struct.Struct
+    frame_id: str
+
+
+@functools.lru_cache
+def _known_places(type_name: str, encapsulation: bytes, frame: bytes, size: int) -> _Places | None:
+    start = encapsulation + bytes(10) + frame
+    try:
+        header, fields = _checked_layout(type_name, start + bytes(size - len(start)))
+    except BagError:
+        return None
+    order, body = header.byte_order, header.body_offset
+    covariance = fields.get("covariance")
+    return _Places(struct.Struct(f"{order}iI"), body + fields["acceleration"].offset,
+                   body + covariance.offset if covariance else None,
+                   struct.Struct(f"{order}3d"), struct.Struct(f"{order}9d"), header.frame_id)
+
+
+def _places_of(type_name: str, messages: Sequence[bytes]) -> _Places | None:
+    """Places in messages of one layout; None where they have several, or none."""
+    first = messages[0]
+    size = len(first)
+    if size < 16:
+        return None
+    frame = bytes(first[12 : 16 + struct.unpack_from("<I" if first[1] else ">I", first, 12)[0]])
+    for message in messages:
+        if len(message) != size or message[1] != first[1] or not message.startswith(frame, 12):
+            return None
+    return _known_places(type_name, bytes(first[:2]), frame, size)
+
+
+def _few_samples(places: _Places, messages: Sequence[bytes]) -> Samples:
+    """What `_samples_of` does, at less cost than setting up arrays for a few messages."""
+    stamps, values, variances = [], [], []
+    for message in messages:
+        sec, nanosec = places.stamp.unpack_from(message, 4)
+        stamps.append(sec * 1_000_000_000 + nanosec)
+        values.append(places.three.unpack_from(message, places.acceleration))
+        variance = (np.nan,) * 3
+        if places.covariance is not None:
+            covariance = places.nine.unpack_from(message, places.covariance)
+            if covariance[0] != -1.0 and any(covariance):
+                variance = covariance[_DIAGONAL]
+        variances.append(variance)
+    return Samples(np.array(stamps, np.int64), np.array(values), np.array(variances),
+                   places.frame_id)
+
+
+def _few_replaced(places, messages, stamps_ns, values, variance) -> list[bytes]:
+    """What `_patched` does with the whole covariance, for a few messages."""
+    result = []
+    for message, stamp_ns, value, of_value in zip(messages, np.asarray(stamps_ns).tolist(),
+                                                  np.asarray(values).tolist(),
+                                                  np.asarray(variance).tolist()):
+        patched = bytearray(message)
+        sec, nanosec = divmod(stamp_ns, 1_000_000_000)
+        if not -(2**31) <= sec < 2**31:
+            split_stamps(stamp_ns)  # says what is wrong
+        places.stamp.pack_into(patched, 4, sec, nanosec)
+        places.three.pack_into(patched, places.acceleration, *value)
+        if places.covariance is not None:
+            x, y, z = of_value
+            if x != x or y != y or z != z:  # NaN
+                x = y = z = 0.0
+            places.nine.pack_into(patched, places.covariance,
+                                  x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z)
+        result.append(bytes(patched))
+    return result
 
 
 @functools.lru_cache

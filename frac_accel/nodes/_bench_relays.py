@@ -19,8 +19,10 @@ QOS = QoSProfile(depth=20_000, reliability=ReliabilityPolicy.RELIABLE)
 
 def typed(node):
     """What everyone writes: a typed callback on the default executor."""
-    publisher = node.create_publisher(Imu, "imu/data", QOS)
-    node.create_subscription(Imu, "imu/data_raw", publisher.publish, QOS)
+    # as many as the command line says, each below a namespace, or one
+    for prefix in [f"s{i}/" for i in range(int(sys.argv[2]))] if sys.argv[2:] else [""]:
+        publisher = node.create_publisher(Imu, f"{prefix}imu/data", QOS)
+        node.create_subscription(Imu, f"{prefix}imu/data_raw", publisher.publish, QOS)
     return SingleThreadedExecutor()
 
 

@@ -22,7 +22,7 @@ from sensor_msgs.msg import Imu, PointCloud2
 from ..io import cdr
 from ..io.samples import Samples
 from ._bench_stamps import START_NS
-from ._runtime import RawSubscription
+from ._intake import RawSubscription
 
 DEPTH = 20_000
 QOS = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE)

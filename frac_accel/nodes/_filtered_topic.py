@@ -3,26 +3,19 @@
 import bisect
 import time
 
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import Temperature
 
 from frac_accel.errors import FracAccelError
 from frac_accel.io import cdr
-from frac_accel.nodes._runtime import (
-    INVALID_ENDPOINT,
-    NodeError,
-    RawSubscription,
-    publish_serialized,
-)
+from frac_accel.nodes._errors import INVALID_ENDPOINT, NodeError
+from frac_accel.nodes._intake import RawSubscription, publish_serialized
 from frac_accel.streaming.publisher_tracks import PublisherTracks
 
-# Filtering one sample costs as much as filtering fifty, so above this rate messages are taken in
-# groups, for so long.
-_GROUPED_ABOVE_HZ = 1500.0
-_GROUPING_S = 0.004
-_POLL_S = 0.001
-# Messages that wait for longer than this before what they bring is published count as late.
+# Messages that wait for longer than this and the budget before what they bring is published count
+# as late.
 LATE_S = 0.05
 # What happens to a topic with two publishers: the one that came first is corrected, or none is.
 ON_TWO_PUBLISHERS = ("first", "none")
@@ -30,14 +23,24 @@ ON_TWO_PUBLISHERS = ("first", "none")
 _MOST_HELD = 200_000
 
 
-def subscribe_temperature(node, filtered_topics):
-    """Hand what comes on ``imu/temperature`` to the topics; returns the subscription."""
+def subscribe_temperature(node, filtered_topics, topic="imu/temperature"):
+    """Hand what comes on a topic of temperatures to the filters; returns the subscription."""
     def on_message(message):
-        for topic in filtered_topics:
-            topic.set_temperature(message.temperature)
+        for filtered in filtered_topics:
+            filtered.set_temperature(message.temperature)
 
-    return node.create_subscription(Temperature, "imu/temperature", on_message,
-                                    qos_profile_sensor_data)
+    try:
+        return node.create_subscription(Temperature, topic, on_message, qos_profile_sensor_data)
+    except INVALID_ENDPOINT as error:
+        raise NodeError(f"topic {topic} cannot be subscribed to: {error}") from None
+
+
+def declare_latency_budget(node):
+    """Declare the parameter that says how long messages may wait for each other, and heed it."""
+    node.latency_budget_s = 1e-3 * node.declare(
+        "latency_budget_ms", 5.0,
+        "longest time that a message waits for others to be handled with: costs latency, saves "
+        "processor time; 0: each as it comes", minimum=0.0, maximum=100.0)
 
 
 def raw_qos(depth):
@@ -80,9 +83,10 @@ class FilteredTopic:
         Why the last design failed; empty if it did not.
     unfiltered : int
         Messages that came while there was no filter to be had.
-    published : int
+    published, unpublished : int
+        Outputs that the middleware has taken, and those that it has not.
     late : int
-        Messages that waited for longer than `LATE_S`.
+        Messages that waited for `LATE_S` longer than the node's latency budget.
     overflowed : int
         Messages that were given up because too many were waiting for a filter.
     other_publisher : int
@@ -96,7 +100,8 @@ class FilteredTopic:
                  on_processed=None, on_two_publishers="first"):
         self.messages = None
         self.failure = ""
-        self.unfiltered = self.published = self.late = self.overflowed = self._deepest = 0
+        self.unfiltered = self.published = self.unpublished = 0
+        self.late = self.overflowed = self._deepest = 0
         self.last_message_s = self.last_published_s = None
         self.other_publisher = 0
         self.tracks = PublisherTracks()
@@ -107,21 +112,22 @@ class FilteredTopic:
         self._is_optional = is_optional
         self._offered = self._candidate = self._celsius = None
         self._on_processed = on_processed
-        self._intake = []
+        self._intake, self._last_alone = [], None
         self._task = None
-        self._hold = self._draining = False
-        self._next_s = 0.0
+        self._hold = False
         self._stream_counters, self._past_counters = {}, {}
-        self._wake = node.create_guard_condition(self._advance)
         try:
             self._publisher = node.create_publisher(
                 message_class, topics[1],
                 QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE),
-                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+                qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+                # whoever asks for another QoS is named by the diagnostics
+                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False))
         except INVALID_ENDPOINT as error:
             raise NodeError(f"topic {topics[1]} cannot be published: {error}") from None
         self._subscription = RawSubscription(
             node, message_class, topics[0], self._on_messages, raw_qos(depth), is_direct=True)
+        node.turns.append(self._advance)
 
     @property
     def name(self):
@@ -157,7 +163,8 @@ class FilteredTopic:
                                      for name, count in current.items()}
         return {**self._stream_counters, "lost": self._subscription.lost + self.overflowed,
                 "other_publisher": self.other_publisher,
-                "late": self.late, "without_filter": self.unfiltered, "published": self.published}
+                "late": self.late, "without_filter": self.unfiltered, "published": self.published,
+                "unpublished": self.unpublished}
 
     def take_queue_depth(self):
         """Most messages that were waiting at once since the last call."""
@@ -215,7 +222,7 @@ class FilteredTopic:
             else:
                 design = self._worker.submit(self.stream.prepare, model, design, **wishes)
             while not design.done():
-                self.take_in()
+                self._node.take_in()
             self._candidate = design.result()
         finally:
             self._hold = False
@@ -229,30 +236,33 @@ class FilteredTopic:
             self._publish(self.messages.replace(model, wishes))
         self._advance()
 
-    def take_in(self):
-        """Take what has come, and wait a little: for whoever waits in the executor's thread."""
-        self._subscription.drain()
-        time.sleep(_POLL_S)
-
     def drain(self):
         """Filter what is waiting."""
         self._subscription.drain()
         self._finish_task()
+
+    def destroy(self):
+        """Leave both topics."""
+        self._node.turns.remove(self._advance)
+        self._subscription.destroy()
+        self._node.destroy_publisher(self._publisher)
 
     def _finish_task(self):
         while self._task is not None:
             if self._task.done():
                 self._collect()
             else:
-                self.take_in()
+                self._node.take_in()
 
     def _of_first(self, batch):
         """Messages of the one publisher that is corrected."""
         count, now_s = self._subscription.subscription.get_publisher_count(), time.monotonic()
         if count <= 1:
-            last = batch[-1]
-            self.tracks.alone(_frame_of(last.data), last.sequence, now_s)
+            self._last_alone = batch[-1], now_s
             return batch
+        if self._last_alone:
+            (last, at_s), self._last_alone = self._last_alone, None
+            self.tracks.alone(_frame_of(last.data), last.sequence, at_s)
         kept = [message for message in batch
                 if self.tracks.is_first(_frame_of(message.data), message.sequence, now_s)]
         if not self._takes_first:
@@ -265,23 +275,8 @@ class FilteredTopic:
         if len(self._intake) > _MOST_HELD:
             self.overflowed += len(self._intake) - _MOST_HELD
             del self._intake[:-_MOST_HELD]
-        if self._draining:
-            return
-        pause = self._next_s - time.monotonic()
-        if pause > 0:
-            time.sleep(pause)
-            self._draining = True
-            try:
-                self._subscription.drain()
-            finally:
-                self._draining = False
         self.last_message_s = time.monotonic()
-        self._next_s = self.last_message_s + self._grouping_s()
         self._advance()
-
-    def _grouping_s(self):
-        design = self.stream.design if self._settled else None
-        return 0.0 if design and design.sampling_rate_hz < _GROUPED_ABOVE_HZ else _GROUPING_S
 
     def _advance(self):
         """Filter what has been taken in, unless the filter is being made."""
@@ -304,12 +299,11 @@ class FilteredTopic:
         else:
             self._publish(self.messages.process(messages, arrivals_ns))
         # they came in one after the other
-        since_ns = time.time_ns() - int(1e9 * LATE_S)
+        since_ns = time.time_ns() - int(1e9 * (LATE_S + self._node.latency_budget_s))
         self.late += bisect.bisect_left(arrivals_ns, since_ns)
 
     def _submit(self, function, *arguments):
         self._task = self._worker.submit(function, *arguments)
-        self._task.add_done_callback(lambda _: self._wake.trigger())
 
     def _collect(self):
         task, self._task = self._task, None
@@ -330,8 +324,9 @@ class FilteredTopic:
         self._advance()
 
     def _publish(self, processed):
-        publish_serialized(self._publisher, processed.messages)
-        self.published += len(processed.messages)
+        published = publish_serialized(self._publisher, processed.messages)
+        self.published += published
+        self.unpublished += len(processed.messages) - published
         if processed.messages:
             self.last_published_s = time.monotonic()
         if self._on_processed:

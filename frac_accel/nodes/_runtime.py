@@ -1,53 +1,36 @@
-"""What all nodes share: start and end of the process, parameters, serialised subscriptions."""
+"""What all nodes share: start and end of the process, parameters, types of messages."""
 
 from __future__ import annotations
 
-import contextlib
+import difflib
 import importlib
 import re
 import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import rclpy
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.callback_groups import CallbackGroup
-from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
 from rclpy.exceptions import (
     InvalidNodeNameException,
     InvalidParameterTypeException,
     InvalidParameterValueException,
-    InvalidTopicNameException,
 )
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, qos_policy_name_from_kind
-from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
+from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.signals import SignalHandlerOptions
 
 from frac_accel.errors import FracAccelError
+from frac_accel.nodes._errors import NodeError
+from frac_accel.nodes._intake import DirectIntake, RawSubscription
 
-# The longest that a signal or the end of a node's work goes unnoticed.
-_POLL_S = 0.1
-# How often timers, services and all that is not taken directly have their turn beside it.
-_EXECUTOR_PERIOD_S = 0.05
-
-INVALID_ENDPOINT = (
-    InvalidTopicNameException,
-    InvalidQosOverridesError,
-    InvalidParameterTypeException,
-    RuntimeError,  # an unknown word as override of a QoS policy
-    ValueError,
-)
-"""What rclpy raises for a publisher or subscription that the user has named or set up wrongly."""
-
-
-class NodeError(FracAccelError):
-    """A node that cannot start or go on as asked for."""
+# How often services and all that is not taken directly have their turn.
+_EXECUTOR_PERIOD_S = 0.2
+_POLL_S = 0.001
 
 
 class FracAccelNode(Node):
@@ -55,13 +38,43 @@ class FracAccelNode(Node):
 
     A subclass sets ``done`` when its work is over, and cleans up in `finish`, which is called
     once, before the context is shut down, whether the node is done or a signal has come.
+    ``latency_budget_s`` is how long messages may wait for others to be handled with, ``turns``
+    what is called every ``turn_s`` between them: the longest, too, that a signal goes unnoticed.
     """
 
     done = False
+    latency_budget_s = 0.0
+    turn_s = 0.1
 
     def __init__(self, name: str) -> None:
         self.direct_subscriptions: list[RawSubscription] = []
+        self.turns: list[Callable[[], None]] = []
         super().__init__(name)
+
+    def warn_of_unknown_parameters(self) -> None:
+        """Name what the user has set and the node does not know, once all is declared.
+
+        What has been set is not documented in rclpy; where it cannot be had, nothing is said.
+        """
+        declared = [name for name in self.list_parameters([], 0).names
+                    if not name.startswith("qos_overrides.")]
+        for name in getattr(self, "_parameter_overrides", ()):
+            if self.has_parameter(name) or name.startswith("qos_overrides."):
+                continue
+            near = difflib.get_close_matches(name, declared, 1)
+            hint = f": did you mean '{near[0]}'?" if near else ""
+            self.get_logger().warning(f"parameter '{name}' is not known here{hint}")
+
+    def take_turn(self) -> None:
+        """Do what has its turn now."""
+        for turn in list(self.turns):
+            turn()
+
+    def take_in(self) -> None:
+        """Take what has come, and wait a little: for whoever waits in the executor's thread."""
+        for subscription in list(self.direct_subscriptions):
+            subscription.drain()
+        time.sleep(_POLL_S)
 
     def finish(self) -> None:
         """Complete what the node was doing; nothing by default."""
@@ -75,14 +88,19 @@ class FracAccelNode(Node):
         read_only: bool = True,
         minimum: float | None = None,
         maximum: float | None = None,
+        like=None,
     ):
         """Declare a parameter with its descriptor and return its value.
+
+        A default that somebody has given must be of the type of ``like``.
 
         Raises
         ------
         NodeError
             If the value given by the user has another type or is out of range.
         """
+        if like is not None and _type(default) != _type(like):
+            raise NodeError(f"parameter '{name}' must be such as {like!r}, got {default!r}")
         descriptor = ParameterDescriptor(description=description, read_only=read_only)
         if minimum is not None or maximum is not None:
             is_float = isinstance(default, float)
@@ -106,6 +124,10 @@ class FracAccelNode(Node):
             ) from None
 
 
+def _type(value):
+    return Parameter.Type.from_parameter_value(value)
+
+
 def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | None = None) -> int:
     """Run a node until it is done or the process gets SIGINT or SIGTERM; returns the exit status.
 
@@ -118,16 +140,20 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
+        node.warn_of_unknown_parameters()
         executor = make_executor()
         executor.add_node(node)
-        direct = _DirectIntake(node)
+        direct, next_s = DirectIntake(node), 0.0
         while not (stop.requested or node.done):
             # A bounded wait, because a Python signal handler runs only between two of them.
-            if direct.is_possible:
-                direct.wait(_EXECUTOR_PERIOD_S)
-                executor.spin_once(timeout_sec=0)
+            if direct.is_possible and node.direct_subscriptions:
+                direct.wait(node.turn_s)
+                if time.monotonic() >= next_s:
+                    next_s = time.monotonic() + _EXECUTOR_PERIOD_S
+                    executor.spin_once(timeout_sec=0)
             else:
-                executor.spin_once(timeout_sec=_POLL_S)
+                executor.spin_once(timeout_sec=node.turn_s)
+            node.take_turn()
         node.finish()
         return 0
     except FracAccelError as error:
@@ -184,230 +210,6 @@ def normalised(data: bytes, message_class: type) -> bytes:
     except Exception as error:  # rclpy raises RuntimeError, MemoryError or its own classes
         name = message_class.__name__
         raise NodeError(f"a {name} of {len(data)} bytes cannot be read: {error}") from None
-
-
-class RawMessage(NamedTuple):
-    """A serialised message, its times (sent by the publisher, taken in here) and its number.
-
-    Every publisher counts its own messages; None where the middleware does not tell.
-    """
-
-    data: bytes
-    source_time_ns: int
-    received_time_ns: int
-    sequence: int | None = None
-
-
-class RawSubscription:
-    """Subscription that hands over all serialised messages that are waiting, in one call.
-
-    One callback of rclpy's executors costs as much as taking ten messages.  Each callback here
-    takes all that are there, through ``subscription.handle.take_message``, which rclpy does not
-    document; where that fails, messages are handed over one by one.
-
-    Parameters
-    ----------
-    node, message_class, topic, qos, callback_group : as for ``Node.create_subscription``
-        The QoS can be overridden by the ROS parameters
-        ``qos_overrides.TOPIC.subscription.{reliability,history,depth}``.
-    callback : called with a non-empty list of `RawMessage`
-    is_direct : bool
-        Wait for this topic outside rclpy's executor, whose every wake-up costs as much as
-        filtering fifty samples. Only for a `FracAccelNode` in `run_node`.
-
-    Attributes
-    ----------
-    lost : int
-        Messages that were sent since the first one received and have not come: gaps in the
-        publisher's sequence numbers if the middleware gives them and the topic has one
-        publisher, else what the middleware reports.
-
-    Raises
-    ------
-    NodeError
-        If the topic's name or an overriding parameter is not valid.
-    """
-
-    # A callback that went on for ever would starve the timers.
-    _MAX_BATCH = 1000
-
-    def __init__(
-        self,
-        node: Node,
-        message_class: type,
-        topic: str,
-        callback: Callable[[list[RawMessage]], None],
-        qos: QoSProfile,
-        callback_group: CallbackGroup | None = None,
-        is_direct: bool = False,
-    ) -> None:
-        self.lost = 0
-        if is_direct:
-            callback_group = OutsideExecutor()
-            node.direct_subscriptions.append(self)
-        self.callback_group = callback_group
-        self._last_sequence: int | None = None
-        self._callback = callback
-        self._message_class = message_class
-        self._logger = node.get_logger()
-        self._can_drain = True
-
-        def create(events: SubscriptionEventCallbacks):
-            return node.create_subscription(
-                message_class,
-                topic,
-                self._on_message,
-                qos,
-                raw=True,
-                callback_group=callback_group,
-                event_callbacks=events,
-                qos_overriding_options=QoSOverridingOptions.with_default_policies(),
-            )
-
-        try:
-            self.subscription = create(
-                SubscriptionEventCallbacks(
-                    message_lost=self._on_lost, incompatible_qos=self._on_incompatible_qos
-                )
-            )
-        except UnsupportedEventTypeError:
-            self.subscription = create(SubscriptionEventCallbacks())
-        except INVALID_ENDPOINT as error:
-            raise NodeError(f"topic {topic} cannot be subscribed to: {error}") from None
-
-    def drain(self) -> None:
-        """Hand over what is waiting, until nothing is; a node calls it before it ends."""
-        while self.take_batch():
-            pass
-
-    def take_batch(self) -> bool:
-        """Hand over what is waiting now, once; whether there was anything."""
-        batch = self._waiting()
-        if batch:
-            self._callback(batch)
-        return bool(batch)
-
-    def _on_message(self, data: bytes, info) -> None:
-        self._callback([self._received(data, info), *self._waiting()])
-
-    def _received(self, data: bytes, info) -> RawMessage:
-        sequence, last = info["publication_sequence_number"], self._last_sequence
-        if sequence is not None:
-            if (last is not None and sequence > last + 1
-                    and self.subscription.get_publisher_count() <= 1):
-                self.lost += sequence - last - 1
-            self._last_sequence = sequence
-        received = info["received_timestamp"] or time.time_ns()
-        return RawMessage(data, info["source_timestamp"] or received, received, sequence)
-
-    def _waiting(self) -> list[RawMessage]:
-        batch: list[RawMessage] = []
-        if not self._can_drain:
-            return batch
-        handle = self.subscription.handle
-        try:
-            with handle:
-                take, message_class, received = (
-                    handle.take_message, self._message_class, self._received)
-                for _ in range(self._MAX_BATCH):
-                    taken = take(message_class, True)
-                    if taken is None:
-                        break
-                    batch.append(received(*taken))
-        except (AttributeError, TypeError, rclpy_implementation.RCLError) as error:
-            self._can_drain = False
-            self._logger.warning(f"taking messages one by one: {error}")
-        return batch
-
-    def _on_lost(self, event) -> None:
-        if self._last_sequence is None:
-            self.lost += event.total_count_change
-
-    def _on_incompatible_qos(self, event) -> None:
-        policy = qos_policy_name_from_kind(event.last_policy_kind)
-        self._logger.warning(
-            f"{self.subscription.topic_name}: a publisher offers an incompatible {policy}; "
-            "nothing is received from it"
-        )
-
-
-def publish_serialized(publisher, messages: Sequence[bytes]) -> None:
-    """Publish serialised messages.
-
-    Through ``publisher.handle``, which rclpy does not document, at a third of the cost that
-    ``publish`` adds to each; where that fails, through ``publish``.
-    """
-    handle = getattr(publisher, "handle", None)
-    publish = getattr(handle, "publish_raw", None)
-    with handle if publish else contextlib.nullcontext():
-        for message in messages:
-            (publish or publisher.publish)(message)
-
-
-class OutsideExecutor(CallbackGroup):
-    """Keeps a subscription out of the executor, for as long as `is_active`."""
-
-    is_active = True
-
-    def can_execute(self, entity):
-        return not self.is_active
-
-    def beginning_execution(self, entity):
-        return not self.is_active
-
-    def ending_execution(self, entity):
-        pass
-
-
-class _DirectIntake:
-    """Waits for the direct subscriptions of a node with a wait set of its own.
-
-    It is what rclpy's executors use themselves, and not documented; where it fails, the executor
-    takes the subscriptions over.
-
-    Attributes
-    ----------
-    is_possible : bool
-    """
-
-    def __init__(self, node: FracAccelNode) -> None:
-        self._subscriptions = node.direct_subscriptions
-        self._logger = node.get_logger()
-        self._wait_set = None
-        self.is_possible = bool(self._subscriptions)
-        if self.is_possible:
-            self._attempt(self._make, node)
-
-    def wait(self, seconds: float) -> None:
-        """Hand over what comes within this time."""
-        end_s = time.monotonic() + seconds
-        while (left_s := end_s - time.monotonic()) > 0 and self.is_possible:
-            for subscription in self._attempt(self._ready, left_s) or ():
-                subscription.take_batch()
-
-    def _make(self, node: FracAccelNode) -> None:
-        self._wait_set = rclpy_implementation.WaitSet(
-            len(self._subscriptions), 0, 0, 0, 0, 0, node.context.handle)
-
-    def _ready(self, seconds: float) -> list[RawSubscription]:
-        self._wait_set.clear_entities()
-        handles = [each.subscription.handle for each in self._subscriptions]
-        for handle in handles:
-            self._wait_set.add_subscription(handle)
-        self._wait_set.wait(int(seconds * 1e9))
-        ready = self._wait_set.get_ready_entities("subscription")
-        return [each for each, handle in zip(self._subscriptions, handles)
-                if handle.pointer in ready]
-
-    def _attempt(self, function, *arguments):
-        try:
-            return function(*arguments)
-        except (AttributeError, TypeError, rclpy_implementation.RCLError) as error:
-            self.is_possible = False
-            for subscription in self._subscriptions:
-                subscription.callback_group.is_active = False
-            self._logger.warning(f"messages are waited for by the executor: {error}")
-            return None
 
 
 class _StopSignals:

@@ -14,13 +14,8 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from frac_accel.io import cdr
 from frac_accel.io.bag import BagReader, Message, TopicInfo
-from frac_accel.nodes._runtime import (
-    INVALID_ENDPOINT,
-    FracAccelNode,
-    NodeError,
-    import_message_class,
-    run_node,
-)
+from frac_accel.nodes._errors import INVALID_ENDPOINT, NodeError
+from frac_accel.nodes._runtime import FracAccelNode, import_message_class, run_node
 
 _ACKNOWLEDGEMENT_TIMEOUT_S = 10.0
 _POLL_S = 0.02

@@ -8,14 +8,9 @@ from functools import partial
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from frac_accel.io.bag import BagWriter, Qos
-from frac_accel.nodes._runtime import (
-    FracAccelNode,
-    NodeError,
-    RawMessage,
-    RawSubscription,
-    import_message_class,
-    run_node,
-)
+from frac_accel.nodes._errors import NodeError
+from frac_accel.nodes._intake import RawMessage, RawSubscription
+from frac_accel.nodes._runtime import FracAccelNode, import_message_class, run_node
 
 _DISCOVERY_PERIOD_S = 0.1
 _NEVER_BY_DEFAULT = ("/rosout", "/parameter_events")

@@ -4,14 +4,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 from frac_accel.io import cdr
 from frac_accel.model import SensorModel
-from frac_accel.nodes._filtered_topic import FilteredTopic, subscribe_temperature
-from frac_accel.nodes._runtime import (
-    FracAccelNode,
-    NodeError,
-    import_message_class,
-    normalised,
-    run_node,
+from frac_accel.nodes._errors import NodeError
+from frac_accel.nodes._filtered_topic import (
+    FilteredTopic,
+    declare_latency_budget,
+    subscribe_temperature,
 )
+from frac_accel.nodes._runtime import FracAccelNode, import_message_class, normalised, run_node
 from frac_accel.streaming.live_messages import NoisySensor, SampleMessages
 
 
@@ -32,6 +31,7 @@ class VirtualSensor(FracAccelNode):
         depth = self.declare(
             "depth", 2000, "queue of each topic: message rate times the longest stall, at least",
             minimum=1, maximum=10**6)
+        declare_latency_budget(self)
         if not model_file:
             raise NodeError("parameter 'model_file' is missing: -p model_file:=SENSOR.yaml")
         message_class = import_message_class(cdr.IMU)

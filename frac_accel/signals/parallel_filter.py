@@ -71,6 +71,10 @@ class ParallelFilter:
 
     @functools.cached_property
     def chains(self):
+        """`chains_within` rounding that nobody can measure."""
+        return self.chains_within(_ROUNDING)
+
+    def chains_within(self, rounding):
         r"""The same filter as taps beside chains of second-order sections, which run much faster.
 
         With a constant :math:`d = \sum_j |r_j|` added, the recursive part has zeros that lie beside
@@ -80,6 +84,11 @@ class ParallelFilter:
         distances from one, which the slow ones hardly differ from. The slowest poles of all stay
         beside the product: their rounded coefficients would spoil the whole of it. Where residues
         cancel each other so much that rounding shows, the sections stay beside each other.
+
+        Parameters
+        ----------
+        rounding : float
+            Share of the response that it may be off by, from a thousandth of its largest on.
 
         Returns
         -------
@@ -95,7 +104,7 @@ class ParallelFilter:
             axis=0) for chain in chains)
         stated = self.frequency_response(share, 1.0) / z**self.lead
         size = np.abs(stated)
-        if np.all(np.abs(found - stated) <= _ROUNDING * (size + 1e-3 * size.max())):
+        if np.all(np.abs(found - stated) <= rounding * (size + 1e-3 * size.max())):
             return taps, chains
         return np.array(self.taps, float), self._side_by_side()
 
@@ -167,11 +176,14 @@ class FilterState:
     parallel_filter : ParallelFilter
     level : ndarray, shape (k,)
         The input of each axis before the first sample: a constant.
+    rounding : float, optional
+        As for `ParallelFilter.chains_within`.
     """
 
-    def __init__(self, parallel_filter, level):
+    def __init__(self, parallel_filter, level, rounding=None):
         self._waiting = np.repeat(level[:, None], parallel_filter.lead, axis=1)
-        self._taps, chains = parallel_filter.chains
+        self._taps, chains = (parallel_filter.chains if rounding is None
+                              else parallel_filter.chains_within(rounding))
         self._taps_state = np.outer(level, steady_state(self._taps, _FIR))
         self._chains = [(chain, _steady_chain(chain, level)) for chain in chains]
 

@@ -1,5 +1,7 @@
 """Correction of raw samples, for node and command alike."""
 
+import functools
+
 import numpy as np
 
 from ..correction.design import design_inverse, reference_gain
@@ -8,6 +10,9 @@ from .bridging import MEMBERS
 from .plausibility import stated_range
 from .stream import Stream
 from .time_steps import moved
+
+# Sensors of one kind share their filters' design, which nothing changes.
+_shared_design = functools.lru_cache(16)(design_inverse)
 
 
 class Corrector(Stream):
@@ -49,7 +54,7 @@ class Corrector(Stream):
     """
 
     def _design(self, model, sampling_rate_hz, **wishes):
-        return design_inverse(model, sampling_rate_hz, **wishes)
+        return _shared_design(model, sampling_rate_hz, **wishes)
 
     def _adopt(self, model):
         super()._adopt(model)

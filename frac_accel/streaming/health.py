@@ -93,6 +93,10 @@ class Situation:
     findings : Findings
     reference_silent_s : float or None
         Time since the last reference message, where there was one.
+    zero_stamps : bool
+        Whether messages came whose stamp is zero.
+    without_clock : bool
+        Whether the time is to come from ``/clock`` and does not.
     """
 
     topic: str
@@ -118,6 +122,8 @@ class Situation:
     load: float = 0.0
     findings: Findings = dataclasses.field(default_factory=Findings)
     reference_silent_s: float | None = None
+    zero_stamps: bool = False
+    without_clock: bool = False
 
 
 def judge(situation):
@@ -130,6 +136,14 @@ def judge(situation):
     message : str
         Why nothing is being published, where nothing is; otherwise what is wrong, if anything.
     """
+    level, message = _judge(situation)
+    if situation.without_clock:
+        return max(level, WARN), ("use_sim_time is true, but nothing has come on /clock; "
+                                  f"{message}")
+    return level, message
+
+
+def _judge(situation):
     reason = _silence(situation)
     if reason:
         level, message = reason
@@ -183,6 +197,8 @@ def _no_output(s):
     if not received and changes.get("malformed"):
         return ERROR, (f"all {changes['malformed']} messages of the last second could not be read "
                        f"as the type of {s.topic}")
+    if s.zero_stamps:
+        return ERROR, (f"the stamps on {s.topic} are zero: let the driver stamp its messages")
     if s.designing:
         return WARN, "the filter is being designed"
     dropped = {name: changes.get(name, 0) for name in _DROPPED}
@@ -245,6 +261,9 @@ def _troubles(s):
         troubles.append(f"{changes['malformed']} messages could not be read")
     if changes.get("lost"):
         troubles.append(f"{changes['lost']} messages were lost on the way: raise depth")
+    if changes.get("unpublished"):
+        troubles.append(f"{changes['unpublished']} corrected messages were not taken by the "
+                        "middleware: a subscriber that must get all of them is too slow")
     if changes.get("late"):
         troubles.append(f"{changes['late']} messages waited too long before they were corrected: "
                         "the machine is too busy")

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import BagError, FracAccelError
 from ..io import cdr
+from ..io.motion import MovedMotion
 from ..io.samples import Samples
 from .live_simulation import LiveSimulator
 
@@ -67,7 +68,7 @@ class SampleMessages:
     """Messages of one sample each.
 
     Every output is the input message that it belongs to, with stamp, acceleration and covariance
-    replaced.
+    replaced, and the rest of the motion taken to the new instant (`MovedMotion`).
 
     Parameters
     ----------
@@ -76,6 +77,8 @@ class SampleMessages:
         One of `cdr.SAMPLE_TYPES`.
     plain : callable
         Turns a message that `cdr` cannot read into one that it can, or raises FracAccelError.
+    frame_id : str
+        Frame of the outputs; empty: that of the inputs.
 
     Attributes
     ----------
@@ -83,10 +86,12 @@ class SampleMessages:
         Messages that could not be read at all.
     """
 
-    def __init__(self, stream, type_name, plain):
+    def __init__(self, stream, type_name, plain, frame_id=""):
         self.stream = stream
+        self._frame_id = frame_id
         self.malformed = 0
         self._type_name = type_name
+        self._motion = MovedMotion(type_name)
         self._plain = plain
         self._count = 0
         self._waiting = {}
@@ -108,8 +113,13 @@ class SampleMessages:
         given = [self._waiting.pop(index) for index in filtered.index.tolist()]
         if len(self._waiting) > _FORGET_AT:
             self._waiting = {index: self._waiting[index] for index in self.stream.waiting.tolist()}
-        messages = cdr.replace_samples(self._type_name, [message for message, _ in given],
-                                       filtered.stamps_ns, filtered.values, filtered.variance)
+        messages = [message for message, _ in given]
+        if given:
+            messages = self._motion.moved(messages, self.stream.design.sensor_delay_ns)
+        if self._frame_id:
+            messages = [cdr.with_frame(message, self._frame_id) for message in messages]
+        messages = cdr.replace_samples(self._type_name, messages, filtered.stamps_ns,
+                                       filtered.values, filtered.variance)
         return Processed(messages, samples, filtered.stamps_ns, filtered.values,
                          np.array([arrival for _, arrival in given], np.int64))
 
@@ -123,8 +133,9 @@ class BlockMessages:
     Parameters and attributes as for `SampleMessages`.
     """
 
-    def __init__(self, stream, plain):
+    def __init__(self, stream, plain, frame_id=""):
         self.stream = stream
+        self._frame_id = frame_id
         self.malformed = 0
         self._plain = plain
         self._starts, self._arrivals_ns, self._frames = [], [], []
@@ -140,7 +151,7 @@ class BlockMessages:
                 blocks.append(samples)
                 self._starts.append(count)
                 self._arrivals_ns.append(arrival_ns)
-                self._frames.append(samples.frame_id)
+                self._frames.append(self._frame_id or samples.frame_id)
                 count += len(samples.stamps_ns)
         if not blocks:
             return _nothing_processed()

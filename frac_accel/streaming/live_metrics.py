@@ -16,6 +16,7 @@ FEWEST_SAMPLES = 64
 # Clipping is suspected where at least this share of a window sits at its end.
 CLIPPED_SHARE = 1e-3
 _CLIPPED_RUN = 3
+_TOGETHER = 256
 _FEWEST_LEVELS = 16
 
 ERROR_NAMES = ("amplitude_error", "phase_error_deg", "nrmse", "peak_error")
@@ -99,13 +100,21 @@ class LiveMetrics:
     def __init__(self, window_s, band_edges_hz=()):
         self._raw, self._corrected = Window(window_s), Window(window_s)
         self._bands = tuple(zip(band_edges_hz[:-1], band_edges_hz[1:]))
-        self._latencies_s = []
+        self._added, self._latencies_s = [], []
 
-    def add(self, raw, stamps_ns, values, latencies_s):
-        """Append raw `Samples`, and corrected ones with their latency [s]."""
-        self._raw.add(raw.stamps_ns, raw.values)
-        self._corrected.add(stamps_ns, values)
-        self._latencies_s.append(latencies_s)
+    def add(self, raw, stamps_ns, values, arrivals_ns, now_ns):
+        """Append raw `Samples`, and corrected ones that came at some instants and go out now."""
+        # looked at together with others: a little at a time costs more
+        self._added.append((raw, stamps_ns, values, arrivals_ns, now_ns))
+        if len(self._added) >= _TOGETHER:
+            self._take_in()
+
+    def _take_in(self):
+        added, self._added = self._added, []
+        for raw, stamps_ns, values, arrivals_ns, now_ns in added:
+            self._raw.add(raw.stamps_ns, raw.values)
+            self._corrected.add(stamps_ns, values)
+            self._latencies_s.append(1e-9 * (now_ns - arrivals_ns))
 
     def snapshot(self, reference, design):
         """`Snapshot` of now.
@@ -115,6 +124,7 @@ class LiveMetrics:
         reference : Window or None
         design : FilterDesign or None
         """
+        self._take_in()
         reference = reference or Window(0)
         bands = tuple(self._bands or (axis.band_hz,) for axis in design.axes) if design else ()
         return Snapshot(self._raw.samples(), self._corrected.samples(), reference.samples(),
@@ -122,6 +132,7 @@ class LiveMetrics:
 
     def take_latencies(self):
         """Figures of the latencies since the last call, by topic name."""
+        self._take_in()
         latencies, self._latencies_s = self._latencies_s, []
         latencies = np.concatenate(latencies) if latencies else np.empty(0)
         if not len(latencies):

@@ -122,6 +122,40 @@ def test_patching_changes_stamp_acceleration_and_diagonal_only(type_name, frames
         assert after == serialised(type_name, ros_message, before[1] == 1)
 
 
+@pytest.mark.parametrize("little_endian", [True, False])
+@pytest.mark.parametrize("type_name", cdr.SAMPLE_TYPES)
+def test_a_few_messages_are_treated_as_many(type_name, little_endian):
+    rng = np.random.default_rng(7)
+    truth = [message(rng, type_name, "imu") for _ in range(24)]
+    if type_name == cdr.IMU:
+        for i, covariance in enumerate([[0] * 9, [-1] + [0] * 8, [0] * 8 + [1], [np.nan] * 9]):
+            truth[i].linear_acceleration_covariance = np.array(covariance, float)
+    data = [serialised(type_name, one, little_endian) for one in truth]
+    many = cdr.read_samples(type_name, data)
+    few = Samples.concatenate([cdr.read_samples(type_name, data[i:i + 2])
+                               for i in range(0, len(data), 2)])
+    for one, other in zip(few, many):
+        np.testing.assert_array_equal(one, other)
+    stamps, values = rng.integers(0, 2**60, size=len(data)), rng.normal(size=(len(data), 3))
+    variance = rng.uniform(1, 2, size=(len(data), 3))
+    variance[3, 1] = np.nan
+    assert cdr.replace_samples(type_name, data, stamps, values, variance) == [
+        patched for i in range(0, len(data), 3) for patched in cdr.replace_samples(
+            type_name, data[i:i + 3], stamps[i:i + 3], values[i:i + 3], variance[i:i + 3])]
+    with pytest.raises(BagError, match="time stamp"):
+        cdr.replace_samples(type_name, data[:1], [2**62], values[:1], variance[:1])
+
+
+@pytest.mark.parametrize("type_name", cdr.SAMPLE_TYPES)
+@pytest.mark.parametrize("frame_id", FRAMES)
+def test_a_message_can_have_another_frame(type_name, frame_id):
+    for i, before in enumerate(FRAMES):
+        ros_message = message(np.random.default_rng(i), type_name, before)
+        data = serialised(type_name, ros_message, i % 2 == 0)
+        ros_message.header.frame_id = frame_id
+        assert cdr.with_frame(data, frame_id) == serialised(type_name, ros_message, i % 2 == 0)
+
+
 def random_samples(rng, count, frame_id="accel_link"):
     stamps = 1_700_000_000 * 10**9 + np.cumsum(rng.integers(1, 10**7, size=count))
     variance = rng.uniform(0.1, 1, size=(count, 3))

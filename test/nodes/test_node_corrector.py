@@ -13,7 +13,7 @@ pytest.importorskip("rclpy")
 from geometry_msgs.msg import AccelStamped
 from rclpy.serialization import deserialize_message, serialize_message
 from ros_probe import BEST_EFFORT, RELIABLE, Probe, background, publish
-from ros_processes import NodeProcess, ros_domain
+from ros_processes import ROOT, NodeProcess, ros_domain
 from sensor_msgs.msg import Imu, PointCloud2
 
 from frac_accel.io import cdr
@@ -121,6 +121,29 @@ def test_live_is_offline_to_the_last_bit_and_nothing_is_lost(record, model_file,
     assert counters.pop("published") == len(expected)
     assert counters == {name: count for name, count in offline.counters.items() if count}
     assert {"duplicates", "stamps_back", "not_finite", "gaps", "restarts"} <= set(counters)
+
+
+def test_a_bench_that_plays_as_fast_as_it_can_loses_nothing(record, model_file, tmp_path):
+    samples = raw_samples(record)._replace(frame_id="seat")
+    write_bag(tmp_path / "raw.mcap", {RAW_TOPIC: samples})
+    bench = "--params-file", str(ROOT / "config" / "bench.yaml")
+    with ros_domain() as environment, \
+            NodeProcess("recorder", environment, {"bag": tmp_path / "live.mcap",
+                                                  "idle_timeout_s": 5.0}, *bench) as recorder, \
+            NodeProcess("corrector", environment, {
+                "model_file": model_file, "sample_rate_hz": RATE_HZ}, *bench) as corrector:
+        recorder.wait_for(f"recording {CORRECTED_TOPIC} ")
+        with NodeProcess("player", environment, {
+                "bag": tmp_path / "raw.mcap", "rate": 0.0, "wait_for_subscribers": 2},
+                *bench) as player:
+            assert player.wait() == 0, player.text
+        assert recorder.wait() == 0, recorder.text
+        assert corrector.stop() == 0, corrector.text
+    live = read_bag(tmp_path / "live.mcap")[CORRECTED_TOPIC]
+    expected = Corrector(SensorModel.load(model_file), RATE_HZ).process(*samples[:3])
+    np.testing.assert_array_equal(live.stamps_ns, expected.stamps_ns)
+    np.testing.assert_array_equal(live.values, expected.values)
+    assert "lost" not in corrector.output[-1]
 
 
 def test_everything_else_of_a_message_stays(record, model_file):

@@ -14,14 +14,16 @@ from rosbags.typesys import Stores, get_typestore  # noqa: E402
 from sensor_msgs.msg import Imu  # noqa: E402
 
 from frac_accel.io import cdr  # noqa: E402
+from frac_accel.nodes._errors import NodeError  # noqa: E402
+from frac_accel.nodes._intake import (  # noqa: E402
+    DirectIntake,
+    RawSubscription,
+    publish_serialized,
+)
 from frac_accel.nodes._runtime import (  # noqa: E402
     FracAccelNode,
-    NodeError,
-    RawSubscription,
-    _DirectIntake,
     import_message_class,
     normalised,
-    publish_serialized,
 )
 
 pytestmark = pytest.mark.ros
@@ -111,7 +113,7 @@ def test_direct_subscriptions_need_no_executor_and_fall_back_on_it(node):
     deadline = time.monotonic() + 20
     while not subscription.subscription.get_publisher_count() and time.monotonic() < deadline:
         time.sleep(0.01)
-    intake = _DirectIntake(node)
+    intake = DirectIntake(node)
     sent = [message(number) for number in range(20)]
 
     def received():
@@ -123,7 +125,7 @@ def test_direct_subscriptions_need_no_executor_and_fall_back_on_it(node):
     while len(received()) < 10 and time.monotonic() < deadline:
         intake.wait(0.1)
     assert received() == sent[:10]
-    intake._wait_set = None  # as in an rclpy without it
+    intake._ready = None  # as in an rclpy without it
     intake.wait(0.1)
     assert not intake.is_possible
     publish_serialized(publisher, sent[10:])
@@ -141,7 +143,7 @@ def test_a_topic_that_never_falls_silent_leaves_time_for_the_rest(node):
     while not subscription.subscription.get_publisher_count() and time.monotonic() < deadline:
         time.sleep(0.01)
     publisher.publish(message(0))
-    intake = _DirectIntake(node)
+    intake = DirectIntake(node)
     start = time.monotonic()
     intake.wait(0.1)
     assert time.monotonic() - start < 1.0

@@ -20,11 +20,12 @@ def named_in(*files):
 
 
 def test_the_corrector_may_use_its_topics():
-    named = named_in("nodes/corrector.py")
+    named = named_in("nodes/_sensor.py", "nodes/_filtered_topic.py")
     assert {"imu/data_raw", "imu/data"} <= named
     may = allowed("corrector", "topic", "subscribe") | allowed("corrector", "topic", "publish")
     assert named <= may
-    assert {"diagnostics", "corrector/metrics/*"} <= allowed("corrector", "topic", "publish")
+    assert {"diagnostics", "corrector/metrics", "corrector/metrics/*"} <= allowed(
+        "corrector", "topic", "publish")
     assert "imu/data_raw" not in allowed("corrector", "topic", "publish")
 
 
@@ -38,9 +39,12 @@ def test_only_maintenance_may_change_a_model():
     asking = {profile.get("node") for profile in POLICY.iter("profile")
               for group in profile.iter("services") if group.get("request") == "ALLOW"
               for service in group.iter("service")
-              if re.search("set_parameters|reload_model", service.text)}
+              if re.search("set_parameters|reload_model|_sensor", service.text)}
     assert asking == {"maintenance"}
-    assert {"~/set_parameters", "~/reload_model"} <= allowed("corrector", "service", "reply")
+    own = set(re.findall(r'"(~/[a-z]+_[a-z]+)"',
+                         (ROOT / "frac_accel" / "nodes" / "corrector.py").read_text()))
+    assert own == {"~/reload_model", "~/add_sensor", "~/remove_sensor"}
+    assert own | {"~/set_parameters"} <= allowed("corrector", "service", "reply")
 
 
 def test_every_pin_has_a_hash_and_pip_asks_for_them():

@@ -157,6 +157,8 @@ def test_on_a_vehicle_a_corrector_that_has_died_is_started_again():
     tree = ast.parse((ROOT / "launch" / "vehicle.launch.py").read_text())
     given, = ({keyword.arg: keyword.value for keyword in call.keywords} for call in ast.walk(tree)
               if isinstance(call, ast.Call) and getattr(call.func, "id", "") == "Node")
+    assert {"name", "use_sim_time", "temperature_topic"} <= declared_arguments(
+        tree, "DeclareLaunchArgument")
     assert ast.literal_eval(given["executable"]) == "corrector"
     assert ast.literal_eval(given["respawn"]) is True
     assert ast.literal_eval(given["respawn_delay"]) <= 2.0
@@ -176,12 +178,17 @@ def test_launch_and_config_set_only_parameters_of_the_node(node):
         for executable, names in node_calls(ast.parse(path.read_text())):
             given |= set(names) if executable == node else set()
     for path in (ROOT / "config").glob("*.yaml"):
-        section = yaml.safe_load(path.read_text()).get(f"/**/{node}", {})
-        given |= set(section.get("ros__parameters", {}))
-    source = (ROOT / "frac_accel" / "nodes" / f"{node}.py").read_text()
-    literals = {part.value for part in ast.walk(ast.parse(source))
+        document = yaml.safe_load(path.read_text())
+        for section in (f"/**/{node}", *(["/**"] if node == "corrector" else [])):
+            own = document.get(section, {}).get("ros__parameters", {})
+            given |= set(own).difference(own.get("sensors", ()))
+    folder = ROOT / "frac_accel" / "nodes"
+    sources = [folder / f"{node}.py", folder / "_filtered_topic.py",
+               folder / "_sensor_parameters.py"]
+    literals = {part.value for path in sources for part in ast.walk(ast.parse(path.read_text()))
                 if isinstance(part, ast.Constant)}
-    assert given and given <= literals
+    # what every node of rclpy has
+    assert given and given <= literals | {"use_sim_time", "qos_overrides"}
 
 
 def test_example_models_load():

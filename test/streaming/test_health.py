@@ -56,6 +56,13 @@ def test_all_is_well():
     (changed(changes={"other_publisher": 900}, takes_first=False, other_publishers=("/b",)), ERROR,
      "/imu/data_raw has another publisher (/b): none is corrected"),
     (changed(changes=SILENT), WARN, "the filter is warming up: 17 of 33 samples"),
+    (changed(changes=SILENT, zero_stamps=True, sample_rate_hz=None, counters={"waiting": 4}), ERROR,
+     "the stamps on /imu/data_raw are zero: let the driver stamp its messages"),
+    (changed(model_file="", without_clock=True), ERROR,
+     "use_sim_time is true, but nothing has come on /clock; no model"),
+    (changed(without_clock=True), WARN, "nothing has come on /clock; correcting at 2000 Hz"),
+    (changed(changes=GOOD.changes | {"unpublished": 3}), WARN,
+     "3 corrected messages were not taken"),
 ])
 def test_silence_is_explained(situation, level, words):
     assert judge(situation)[0] == level

@@ -121,7 +121,7 @@ def test_a_window_drops_what_cannot_be_judged():
 def test_latencies_are_those_since_the_last_call():
     metrics = LiveMetrics(1.0)
     none = Samples.of([], np.empty((0, 3)))
-    metrics.add(none, none.stamps_ns, none.values, np.arange(101) / 1000)
+    metrics.add(none, none.stamps_ns, none.values, -(10**6) * np.arange(101), 0)
     figures = metrics.take_latencies()
     assert figures == pytest.approx({"latency_p50_s": 0.05, "latency_p99_s": 0.099,
                                      "latency_max_s": 0.1})

@@ -1,0 +1,19 @@
+"""What goes wrong where a user has named or set up something wrongly."""
+
+from rclpy.exceptions import InvalidParameterTypeException, InvalidTopicNameException
+from rclpy.qos_overriding_options import InvalidQosOverridesError
+
+from frac_accel.errors import FracAccelError
+
+INVALID_ENDPOINT = (
+    InvalidTopicNameException,
+    InvalidQosOverridesError,
+    InvalidParameterTypeException,
+    RuntimeError,  # an unknown word as override of a QoS policy
+    ValueError,
+)
+"""What rclpy raises for a publisher or subscription that the user has named or set up wrongly."""
+
+
+class NodeError(FracAccelError):
+    """A node that cannot start or go on as asked for."""

@@ -1,0 +1,99 @@
+"""Orientation and angular velocity of a corrected message are those of its new instant."""
+
+import numpy as np
+import pytest
+from rosbags.typesys import Stores, get_typestore
+
+from frac_accel.io import cdr
+from frac_accel.io.motion import MovedMotion
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+TYPES = STORE.types
+START_NS = 1_700_000_000 * 10**9
+RATE_HZ = 100.0
+
+
+def orientation(t):
+    """Turning about z with up to a radian a second; x, y, z, w."""
+    angle = np.sin(t)
+    return np.stack([0 * t, 0 * t, np.sin(angle / 2), np.cos(angle / 2)], axis=1)
+
+
+def angular_velocity(t):
+    return np.stack([0 * t, np.sin(3 * t), np.cos(t)], axis=1)
+
+
+def messages(stamps_ns, known=(True, True), flipped=False):
+    t = 1e-9 * (stamps_ns - START_NS)
+    result = []
+    for i, (stamp, q, rate) in enumerate(zip(stamps_ns.tolist(), orientation(t),
+                                             angular_velocity(t))):
+        header = TYPES["std_msgs/msg/Header"](
+            TYPES["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9), "imu")
+        covariances = [np.r_[0.01 if each else -1.0, np.zeros(8)] for each in known]
+        q = -q if flipped and i % 2 else q
+        result.append(TYPES[cdr.IMU](
+            header, TYPES["geometry_msgs/msg/Quaternion"](*q), covariances[0],
+            TYPES["geometry_msgs/msg/Vector3"](*rate), covariances[1],
+            TYPES["geometry_msgs/msg/Vector3"](1.0, 2.0, 3.0), np.ones(9)))
+    return [bytes(STORE.serialize_cdr(each, cdr.IMU)) for each in result]
+
+
+def fields(data):
+    read = [STORE.deserialize_cdr(each, cdr.IMU) for each in data]
+    q, w = [each.orientation for each in read], [each.angular_velocity for each in read]
+    return (np.array([[each.x, each.y, each.z, each.w] for each in q]),
+            np.array([[each.x, each.y, each.z] for each in w]))
+
+
+def stamps(count=400):
+    return START_NS + (np.arange(count) * 1e9 / RATE_HZ).astype(np.int64)
+
+
+@pytest.mark.parametrize("flipped", [False, True])
+@pytest.mark.parametrize("delay_s", [0.0004, 0.01, 0.0537])
+def test_they_are_those_of_the_instant_before(delay_s, flipped):
+    at = stamps()
+    moved = MovedMotion(cdr.IMU).moved(messages(at, flipped=flipped), int(1e9 * delay_s))
+    q, rate = fields(moved)
+    t = np.maximum(1e-9 * (at - START_NS) - delay_s, 0.0)
+    # of a chord over a sampling interval h: an eighth of h² times the second derivative
+    most = (1 / RATE_HZ)**2 / 8
+    assert np.abs(rate - angular_velocity(t)).max() < 9.1 * most
+    turned = np.abs((q * orientation(t)).sum(axis=1))
+    assert 2 * np.arccos(np.minimum(turned, 1.0)).max() < 1.1 * most + 1e-7
+    np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1.0, rtol=1e-12)
+    # and nothing else is touched
+    for before, after in zip(messages(at, flipped=flipped), moved):
+        body = cdr.read_header(before).body_offset
+        assert after[:body] == before[:body] and after[body + 32:body + 104] == \
+            before[body + 32:body + 104] and after[body + 128:] == before[body + 128:]
+
+
+def test_blocks_of_any_length_give_the_same_bytes():
+    data, random = messages(stamps()), np.random.default_rng(1)
+    whole = MovedMotion(cdr.IMU).moved(data, 23_400_000)
+    edges = [0, *np.sort(random.choice(np.arange(1, 400), 150, replace=False)).tolist(), 400]
+    in_parts = MovedMotion(cdr.IMU)
+    assert whole == [each for start, stop in zip(edges[:-1], edges[1:])
+                     for each in in_parts.moved(data[start:stop], 23_400_000)]
+
+
+def test_what_is_not_measured_and_what_has_no_delay_stays():
+    data = messages(stamps(50), known=(False, False))
+    assert MovedMotion(cdr.IMU).moved(data, 5_000_000) == data
+    data = messages(stamps(50), known=(False, True))
+    q, rate = fields(MovedMotion(cdr.IMU).moved(data, 5_000_000))
+    before = fields(data)
+    np.testing.assert_array_equal(q, before[0])
+    assert (rate[1:] != before[1][1:]).any(axis=1).all()
+    assert MovedMotion(cdr.IMU).moved(data, 0) is data
+    assert MovedMotion(cdr.ACCEL_STAMPED).moved(data, 5_000_000) is data
+
+
+def test_a_clock_that_is_set_back_begins_anew():
+    data = messages(stamps(20))
+    moving = MovedMotion(cdr.IMU)
+    once = moving.moved(data, 4_000_000)
+    assert moving.moved(data, 4_000_000) == once
+    assert MovedMotion(cdr.IMU).moved(data + data, 4_000_000) == once + once
