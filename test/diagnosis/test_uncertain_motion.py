@@ -46,5 +46,5 @@ def louder_with_the_motion(output, rng):
 @pytest.mark.parametrize("noise_of", [white, coloured, louder_with_the_motion])
 def test_coverage(noise_of):
     inside = np.abs([scores(seed, noise_of) for seed in range(DRAWS)]) < 1.96
-    # 90 intervals: 0.95 within two standard deviations of chance
-    assert 0.90 <= inside.mean() <= 0.99
+    # three intervals of each record go together: 0.95 within three standard deviations of 30
+    assert 0.85 <= inside.mean() <= 0.99
