@@ -29,6 +29,10 @@ _FLOOR, _SCATTERS = 0.05, 1.3
 # must have none, ratio of the densities there, and how far the sensor must stay below what motion
 # of that density would show.
 _SHARED, _WIDE, _EVEN, _SILENT = 0.2, 0.15, 2.0, 3.0
+# Share of the floor that the median of the segments must have.
+_STEADY = 0.5
+# Relative uncertainty at least: no noise is white to better than that.
+_AS_WHITE = 0.02
 # Rest: share of the stretches that may be at rest at least, how much louder than the quietest.
 _STRETCH_S, _STRETCH, _LOUDER, _FEWEST = 0.5, 200, 1.5, 3
 # Of its signal, the sensor's scatter at rest.
@@ -88,15 +92,21 @@ def reference_noise(record, column, used, covariance_std=None):
     # the ends: what the window makes of the mean, and half a line
     inner = slice(2, -1)
     power = float(np.var(one))
-    most = np.sqrt(np.quantile(own[inner], _FLOOR) * rate / 2)
+    lowest = np.quantile(own[inner], _FLOOR)
+    # a floor that most segments do not have is that of a few spikes
+    median = welch(one, rate, nperseg=size, average="median")[1]
+    if np.quantile(median[inner], _FLOOR) < _STEADY * lowest:
+        return None
+    most = np.sqrt(lowest * rate / 2)
     for std, by in _estimates(record, column, used, covariance_std, most, size):
         if std is not None and std <= _SCATTERS * most and _LEAST < std**2 / power < _MOST:
             share = np.clip(1 - 2 * std**2 / rate / own, 0.0, 1.0)
             # a constant is no noise, and the first line holds what the window leaves of it
             share[:2] = 1.0, share[2]
             count = {"covariance": np.inf, "floor": _WIDE * len(one)}.get(by, len(one) / 4)
-            return ReferenceNoise(float(std), float(std / np.sqrt(2 * count)) or 0.05 * float(std),
-                                  by, tuple(frequency.tolist()), tuple(share.tolist()))
+            known = max(1 / np.sqrt(2 * count), _AS_WHITE)
+            return ReferenceNoise(float(std), float(known * std), by,
+                                  tuple(frequency.tolist()), tuple(share.tolist()))
     return None
 
 

@@ -10,7 +10,7 @@ from frac_accel.model.core import Oscillator
 from frac_accel.model.effects import effect_of
 from frac_accel.record import Record
 
-DRAWS = 30
+DRAWS = 100
 
 
 def scores(seed, noise_of):
@@ -46,5 +46,5 @@ def louder_with_the_motion(output, rng):
 @pytest.mark.parametrize("noise_of", [white, coloured, louder_with_the_motion])
 def test_coverage(noise_of):
     inside = np.abs([scores(seed, noise_of) for seed in range(DRAWS)]) < 1.96
-    # 90 intervals: 0.95 within two standard deviations of chance
-    assert 0.90 <= inside.mean() <= 0.99
+    # 300 intervals, three of each record together: 0.95 within two standard deviations of chance
+    assert 0.91 <= inside.mean() <= 0.99
