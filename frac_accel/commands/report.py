@@ -35,8 +35,8 @@ def run(arguments):
         raise FracAccelError(f"{arguments.result}: {error}") from None
     except _NOT_A_RESULT as error:
         raise FracAccelError(
-            f"{arguments.result}: no complete result, expected what frac_accel diagnose or identify "
-            f"--json writes ({type(error).__name__})") from None
+            f"{arguments.result}: no complete result, expected what frac_accel diagnose or "
+            f"identify --json writes ({type(error).__name__})") from None
     say(f"{arguments.output}: written")
 
 

@@ -206,7 +206,7 @@ class FilteredTopic:
     @property
     def rate_hz(self):
         """Sampling rate [Hz] that a filter is needed for now; None where it is not known."""
-        return self.stream.sample_rate_hz if self._settled else None
+        return self.stream.sampling_rate_hz if self._settled else None
 
     def prepare(self, model, wishes, design=None):
         """Make another model's filter, of this design if there is one; raises FracAccelError."""
@@ -215,7 +215,7 @@ class FilteredTopic:
         if self.messages is None and self._is_optional:
             return
         # the thread that designs has the stream for itself while its rate is still unknown
-        self._hold = self.messages is None or self.stream.sample_rate_hz is None
+        self._hold = self.messages is None or self.stream.sampling_rate_hz is None
         try:
             if self.messages is None:
                 design = self._worker.submit(self._make, model, wishes)
@@ -294,7 +294,7 @@ class FilteredTopic:
             return
         messages = [message.data for message in batch]
         arrivals_ns = [message.received_time_ns for message in batch]
-        if self.stream.sample_rate_hz is None:
+        if self.stream.sampling_rate_hz is None:
             self._submit(self.messages.process, messages, arrivals_ns)
         else:
             self._publish(self.messages.process(messages, arrivals_ns))
