@@ -14,10 +14,10 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu
 
-from ..bench.live import START_NS
 from ..io import cdr
 from ..io.samples import Samples
 from ._bench_relays import QOS
+from ._bench_stamps import START_NS
 from ._intake import DirectIntake, RawSubscription
 from ._runtime import FracAccelNode
 
