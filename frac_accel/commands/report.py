@@ -29,25 +29,27 @@ def run(arguments):
     require_report(arguments.output)
     data = _read(arguments.result)
     try:
-        page = _page(data)
-        page.write(arguments.output)
-    except FracAccelError as error:
-        raise FracAccelError(f"{arguments.result}: {error}") from None
+        _page(arguments.result, data).write(arguments.output)
+    except FracAccelError:
+        raise
     except _NOT_A_RESULT as error:
-        raise FracAccelError(
-            f"{arguments.result}: no complete result, expected what frac_accel diagnose or "
-            f"identify --json writes ({type(error).__name__})") from None
+        raise FracAccelError(f"{arguments.result}: no complete result, expected what frac_accel "
+                             "diagnose or identify --json writes "
+                             f"({type(error).__name__})") from None
     say(f"{arguments.output}: written")
 
 
-def _page(data):
-    if not isinstance(data, dict) or not {"verdict", "structure"} & data.keys():
-        raise FracAccelError("no result of a diagnosis or an identification, expected what "
-                             "frac_accel diagnose or identify --json writes")
-    source = data.get("provenance")
-    if "verdict" in data:
-        return diagnosis_page(Diagnosis.from_dict(data), source)
-    return identification_page(Identification.from_dict(data), source)
+def _page(path, data):
+    try:
+        if not isinstance(data, dict) or not {"verdict", "structure"} & data.keys():
+            raise FracAccelError("no result of a diagnosis or an identification, expected what "
+                                 "frac_accel diagnose or identify --json writes")
+        source = data.get("provenance")
+        if "verdict" in data:
+            return diagnosis_page(Diagnosis.from_dict(data), source)
+        return identification_page(Identification.from_dict(data), source)
+    except FracAccelError as error:
+        raise FracAccelError(f"{path}: {error}") from None
 
 
 def _read(path):

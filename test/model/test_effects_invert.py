@@ -35,8 +35,10 @@ BY_POWER = ("sampling_jitter", "interference_bursts")
 LINKS = ("second_resonance", "low_pass_filter", "linear_phase_filter")
 # in test_reference_faults
 OF_REFERENCE = ("reference_ac_coupling", "reference_delay", "reference_low_pass")
-# in test_empirical_link
-FITTED = ("empirical_link",)
+# in test_reference_noise and test_free_mass
+NOISE_AND_FRICTION = ("reference_noise", "free_mass_friction")
+# in test_empirical_link and test_empirical_map
+FITTED = ("empirical_link", "empirical_map")
 
 
 def test_every_effect_of_this_package_is_tested_here():
@@ -44,7 +46,8 @@ def test_every_effect_of_this_package_is_tested_here():
             if effect.__module__.startswith("frac_accel.")}
     assert ours == {*LINEAR, *ON_SAMPLES, *NONLINEAR, *CORE, *IN_TIME, *LOSSY,
                     *CHANGING, *FORCES, *TURNED,
-                    *BY_POWER, *PATH, *LINKS, *OF_REFERENCE, *FITTED}
+                    *BY_POWER, *PATH, *LINKS, *OF_REFERENCE,
+                    *NOISE_AND_FRICTION, *FITTED}
 
 
 @pytest.mark.parametrize("cause", rig.CAUSES)
