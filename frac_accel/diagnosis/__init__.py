@@ -21,8 +21,9 @@ from ..record.orientation import Orientation, turned_away
 from ..record.sources import pair_of
 from ..simulation import AxisSimulator
 from .engine import Engine
+from .finding import Diagnosis, Finding, insufficient
 from .flat import flat_instead
-from .judgement import Diagnosis, Finding, insufficient, judge
+from .judgement import judge
 from .leftover import related
 from .spikes import spikes
 from .time_limit import TimeLimit

@@ -4,6 +4,8 @@ import dataclasses
 
 import numpy as np
 
+# Share of the held-out error that a cause must take away to matter.
+_RELEVANT = 0.005
 _BLOCKS = 40
 _RESAMPLES = 1000
 
@@ -26,6 +28,11 @@ class Gain:
     after: float
     reduction: float
     ci95: tuple
+
+    @property
+    def is_relevant(self):
+        """Whether it matters, and is above zero for certain."""
+        return self.reduction > _RELEVANT and self.ci95[0] > 0
 
     def as_dict(self):
         """As the result file has it."""

@@ -8,8 +8,8 @@ from ..model.effects import effect_of
 from ..model.parameters import build, parameter_fields
 from ..record.topic import Integrity
 from .evidence import Evidence
+from .finding import Diagnosis, Finding
 from .gain import Gain
-from .judgement import Diagnosis, Finding
 
 _MOST_WORDS = 200
 

@@ -186,7 +186,7 @@ class Effect:
 
         Parameters
         ----------
-        seen : diagnosis.judgement.Seen
+        seen : diagnosis.read_off.Seen
         """
         return None
 
@@ -196,7 +196,7 @@ class Effect:
 
         Parameters
         ----------
-        seen : diagnosis.judgement.Seen
+        seen : diagnosis.read_off.Seen
         shown : Effect or None
             What `of_record` found.
 

@@ -1,0 +1,184 @@
+"""Why a fitted cause is not named: the rules that look at the record beside the fit."""
+
+import math
+
+import numpy as np
+
+from ..model import is_link
+from ..model.effects.base import CROSS_AXIS, OFFSET
+from .engine import WEIGHS
+from .names import cancelling, undetermined
+from .words import is_accounted
+
+# Times the odd (even) part of what is left, in RMS, that an odd (even) cause must take.
+_LIKE_LAW = 10.0
+# Logarithm of the size from which a link changes an end of the band, and damping ratio of a pole
+# below which it shows as a resonance.
+_UNDONE = 0.3
+_RESONANT = 0.19
+# Share of the output (RMS) above which what is left says that little of the sensor is understood.
+_MOST_OF = 0.5
+# A filter beside which a linear part is left must take this many times its RMS, or it may only
+# resemble the true one; several ones may in any case. Likewise what changes with time.
+_RESEMBLES = 30.0
+# Standard uncertainties by which a delay below zero is one.
+_ACAUSAL = 3.0
+
+
+def doubts_about(engine, best, gains, stds, left, noise):
+    """Why fitted causes are not named, in words by cause."""
+    p = engine.problem
+    doubts = dict.fromkeys(engine.uncontested, "the time limit left no time for its rivals")
+    doubts |= left_open(engine, best, stds, gains)
+    takes = {cause: float(np.sqrt(max(g.before**2 - g.after**2, 0.0)))
+             for cause, g in gains.items()}
+    if min(takes.values(), default=np.inf) < WEIGHS * left.rms:
+        unexplained = engine.unexplained(best)
+        for cause, rms in takes.items():
+            if rms < WEIGHS * unexplained:
+                doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) does not stand out of "
+                                         f"what is left unexplained ({unexplained:.3g} RMS)")
+    if noise.rms is None and left.rms > _MOST_OF * np.std(p.measured[p.used]):
+        for cause in gains:
+            doubts.setdefault(cause, f"{left.rms / np.std(p.measured[p.used]):.0%} of the output "
+                                     "is left, and nothing shows that it is noise")
+    for cause, words in {**by_what_is_left(engine, best, takes, left),
+                         **_acausal(engine, best, stds)}.items():
+        doubts.setdefault(cause, words)
+    for pair in cancelling({cause: engine.added(best, cause) for cause in gains}):
+        for cause, other in (pair, pair[::-1]):
+            doubts.setdefault(cause, f"it nearly cancels {other}: together they may stand for "
+                                     "one cause that is not known")
+    spread = float(np.std(p.measured[p.used]))
+    if gains and (left.share > 0 or not is_accounted(engine.rms(best.residual), spread, noise)):
+        for cause, words in engine.unstable(best).items():
+            doubts.setdefault(cause, words)
+    return {cause: words for cause, words in doubts.items() if cause in gains}
+
+
+def by_what_is_left(engine, fitted, takes, left):
+    """Causes beside which what is left is still of their kind, in words by cause.
+
+    Parameters
+    ----------
+    engine : Engine
+    fitted : Fitted
+    takes : dict of str to float
+        RMS that each cause takes [output units].
+    left : Leftover
+    """
+    return {**_other_laws(engine, fitted, takes, left), **_elsewhen(engine, fitted, takes, left),
+            **_imitators(engine, fitted, takes, left), **_on_both_sides(engine, fitted)}
+
+
+def left_open(engine, fitted, stds, causes):
+    """Why the record leaves causes open, in words by cause."""
+    p = engine.problem
+    core, found = p.baseline.axis(p.axis).core, {}
+    for cause in causes:
+        places = [(u, place) for u, place in zip(fitted.unknowns, fitted.theta) if u.cause == cause]
+        words = undetermined(fitted.effects[cause], *zip(*places), stds[cause], core, p.time[-1])
+        if words:
+            found[cause] = words
+    return found
+
+
+def _filters(engine, best):
+    """Causes that act as linear filters, by cause."""
+    return {cause: effect for cause, effect in best.effects.items()
+            if cause not in engine.search.base and not effect.is_constant
+            and (is_link(effect) or effect.pure_delay_s() or effect.restates_core)}
+
+
+def _imitators(engine, best, takes, left):
+    """Linear causes beside which a filter would take still more: they imitate something else."""
+    share = sum(share for share, part in engine.structure(best) if part == "linear")
+    filters = _filters(engine, best)
+    if not share or not filters:
+        return {}
+    rest = math.sqrt(share) * left.rms
+    # a delay is common beside any filter
+    odd = [cause for cause, effect in filters.items() if not effect.everyday] or list(filters)
+    if len(odd) == 1 and takes.get(odd[0], np.inf) > _RESEMBLES * rest:
+        return {}
+    linear = [cause for cause, effect in best.effects.items()
+              if cause in takes and (cause in filters or effect.is_constant)]
+    return dict.fromkeys(linear, f"a linear filter would take another {share:.0%} of what is left: "
+                                 "the linear causes only imitate the true response")
+
+
+def _other_laws(engine, best, takes, left):
+    """Nonlinear causes beside which what is left is still nonlinear in the same way."""
+    parts = {part: math.sqrt(share) * left.rms for share, part in engine.structure(best)
+             if part in ("odd", "even")}
+    found, filters = {}, _filters(engine, best)
+    for cause, taken in takes.items() if parts else ():
+        effect = best.effects[cause]
+        if cause in filters or effect.shows_with_time or effect.everyday or effect.is_constant \
+                or effect.stage == CROSS_AXIS:
+            continue
+        part = "odd" if engine.odd_share(best, cause) > 0.5 else "even"
+        if taken < _LIKE_LAW * parts.get(part, 0.0):
+            found[cause] = f"what is left is {part} too ({parts[part]:.3g} RMS beside the " \
+                           f"{taken:.3g} that it takes): the law is another one"
+    return found
+
+
+def _on_both_sides(engine, best):
+    """Filters of the sensor and of the reference that undo each other at an end of the band."""
+    p = engine.problem
+    ends = 2j * np.pi * np.array([0.01 / p.time[-1], 10 * p.rate])
+    found = {}
+    filters = [(cause, effect, np.log(np.abs(effect.transfer_function(ends))))
+               for cause, effect in _filters(engine, best).items()
+               if is_link(effect) and _is_smooth(effect)]
+    for cause, effect, size in filters:
+        for other, reference, back in filters:
+            if reference.of_reference and not effect.of_reference and np.any(
+                    (size * back < 0) & (np.minimum(np.abs(size), np.abs(back)) > _UNDONE)):
+                words = (f"{cause} and {other} undo each other in part: one filter of the sensor "
+                         "alone, with a zero for the reference's pole, does the same")
+                found |= {cause: words, other: words}
+    return found
+
+
+def _is_smooth(link):
+    """Whether a link has no resonance that would tell it."""
+    poles = np.atleast_1d(link.poles())
+    return not np.any(np.abs(poles.real) < _RESONANT * np.abs(poles))
+
+
+def _elsewhen(engine, best, takes, left):
+    """Causes that grow with time beside which what is left still changes with it."""
+    shares, found = {part: share for share, part in engine.structure(best)}, {}
+    for cause, taken in takes.items():
+        effect = best.effects[cause]
+        # an offset that wanders shows as slow, or as lines of low frequency
+        parts = ("slow", "lines") if effect.stage == OFFSET else ("time_varying",)
+        share = sum(shares.get(part, 0.0) for part in parts)
+        if effect.shows_with_time and not effect.everyday \
+                and taken < _RESEMBLES * math.sqrt(share) * left.rms:
+            found[cause] = f"{share:.0%} of what is left changes with time: the course in time " \
+                           "is another one"
+    return found
+
+
+def _acausal(engine, best, stds):
+    """Links beside a lead, which takes back what they say too much."""
+    p = engine.problem
+    links = {cause: effect for cause, effect in _filters(engine, best).items()
+             if not effect.restates_core}
+    own = [cause for cause, effect in links.items() if not effect.of_reference]
+    effects = p.axis_model(best.effects).effects
+    delay = sum(effect.pure_delay_s() for effect in effects if not effect.of_reference) \
+        - p.record.lag_s
+    std = max((stds.get(cause, {}).get("delay_s", 0.0) for cause in own), default=0.0)
+    if len(own) >= 2 and delay < 0 and delay <= -_ACAUSAL * std:
+        return dict.fromkeys(own, f"together they come to a delay of {delay:.3g} s, which no "
+                                  "sensor has: they imitate something else")
+    # the reference's delay is a lead of the sensor
+    late = {cause: -effect.pure_delay_s() for cause, effect in links.items()
+            if effect.of_reference and effect.pure_delay_s() < 0}
+    return {cause: f"a lead of {lead:.3g} s beside a filter, less than a sampling interval: a "
+                   "digital filter has one of its own"
+            for cause, lead in late.items() if own and lead < 1 / p.rate}

@@ -1,0 +1,96 @@
+"""Causes that a record shows by itself: limits, lattice, stamps, bursts."""
+
+import dataclasses
+import math
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import resample_poly
+
+from ..model.effects import known_effects
+from .finding import Finding
+from .gain import gain
+from .words import gain_words
+
+# Samples of a stretch, and share of a record for which it must move, so that the size of what is
+# left can be compared with the motion's: not in a shock.
+_STRETCH = 64
+_LASTS = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class Seen:
+    """A record beside the best simulation of it, for causes that it shows by itself.
+
+    Attributes
+    ----------
+    record : Record
+    found : Integrity
+    sensor : Samples
+        The sensor's samples as they were recorded.
+    measured, output : ndarray, shape (n,)
+    rows, used : ndarray of bool, shape (n,)
+        Samples that are there, and those of them that the fit counted.
+    is_coarse : bool
+        Whether the values' lattice accounts for much of what is left.
+    """
+
+    record: object
+    found: object
+    sensor: object
+    measured: np.ndarray
+    output: np.ndarray
+    rows: np.ndarray
+    used: np.ndarray
+    is_coarse: bool
+
+    def at_stamps(self):
+        """Instants with a sample, and the simulated output at the stamps that these carry."""
+        stamps = self.record.topics[1].stamps_ns
+        rate = self.record.sampling_rate_hz
+        place = (stamps - self.record.start_ns) * 1e-9 * rate
+        slot = np.round(place).astype(int)
+        good = (slot >= 0) & (slot < len(self.output))
+        fine = resample_poly(self.output, 4, 1)
+        spline = CubicSpline(np.arange(len(fine)) / 4, fine)
+        return slot[good], spline(np.clip(place[good] - self.record.lag_s * rate, 0,
+                                          len(self.output) - 1))
+
+
+def _moving_share(reference):
+    """Share of a record for which the reference moves: its mean power's square over the mean square
+    of the power, in stretches."""
+    count = max(len(reference) // _STRETCH, 1)
+    moving = (reference - reference.mean())[:count * _STRETCH].reshape(count, -1)
+    power = np.mean(np.square(moving), axis=1)
+    return float(power.mean()**2 / max(np.mean(power**2), 1e-300))
+
+
+def _certainty(g):
+    """Chance that a gain is above zero, as its bootstrap interval has it."""
+    std = max((g.ci95[1] - g.ci95[0]) / 3.92, 1e-12)
+    return 0.5 + 0.5 * math.erf(g.reduction / std / math.sqrt(2))
+
+
+def read_off(engine, fitted, found, shown, sensor):
+    """Findings that the record shows by itself: limits, lattice, stamps."""
+    p, findings = engine.problem, []
+    rows = p.record.valid.copy()
+    rows[:64] = rows[-64:] = False
+    seen = Seen(p.record, found, sensor, p.measured, fitted.output, rows, rows & p.used,
+                engine.coarse_step(fitted) is not None)
+    # what the size of a residual tells presumes that it is noise, or bursts of it
+    parts = engine.structure(fitted)
+    is_noise = all(part == "bursts" for _, part in parts) \
+        and _moving_share(p.record.reference[:, p.axis]) > _LASTS
+    for cause, cls in known_effects().items():
+        recognised = cls.recognised(seen, shown.get(cause)) if cls.read_off else None
+        if recognised is None or (cause not in shown and not is_noise):
+            continue
+        effect, reading = recognised
+        g = engine.held_out(fitted, cause) if cause in engine.search.base \
+            else gain(reading.before, reading.after)
+        if g.is_relevant:
+            findings.append(Finding(effect, reading.std, _certainty(g), [], [
+                reading.evidence, *gain_words(cause, g, np.inf, [])], g))
+    return findings

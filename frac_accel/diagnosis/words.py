@@ -1,0 +1,73 @@
+"""The verdict and its words."""
+
+
+from ..budget import WORDS
+
+# Share of the output's RMS that may be left without noise being established, and factor by which an
+# error may exceed noise that is.
+_LITTLE = 0.05
+_AS_NOISE = 1.2
+# Share of the excess power that rounds to nothing.
+_NOTHING = 0.005
+# Share of the residual's power that may be no noise in a record that counts as explained.
+_MOSTLY_NOISE = 0.3
+
+
+def is_accounted(rmse, spread, noise):
+    """Whether an error is small beside the output's spread, or no larger than established noise."""
+    return rmse <= _LITTLE * spread or (noise.rms is not None and rmse <= _AS_NOISE * noise.rms)
+
+
+def verdict_of(findings, suspects, complete, share, fraction, accounted, strange):
+    if not findings and not suspects and share == 0:
+        if strange:
+            return "unexplained"
+        return "consistent" if accounted else "undecided"
+    nothing = fraction < _NOTHING
+    if findings and (nothing or complete and share <= _MOSTLY_NOISE):
+        return "explained" if accounted else "undecided"
+    if findings:
+        return "partly_explained"
+    return "unexplained"
+
+
+def reason_of(verdict, nrmse, noise, accounted, strange):
+    shown = {"rest": "down to the noise that it shows at rest",
+             "covariance": "down to the noise that its messages state",
+             "periods": "down to the noise by which its repeated periods differ",
+             "stated": "down to the noise that was stated",
+             "second_sensor": "down to the noise that a second sensor does not share"}
+    to = shown[noise.by] if noise.rms is not None and nrmse > _LITTLE and accounted \
+        else f"up to {nrmse:.2%} of the output"
+    left = ""
+    if strange:
+        parts = ", ".join(f"{share:.0%} {part} ({WORDS[part]})" for share, part in strange[:2])
+        left = f"; of what is left: {parts}"
+    return {"consistent": f"the model explains the record {to}",
+            "explained": f"the named causes explain the record {to}",
+            "partly_explained": "the named causes leave a part unexplained" + left,
+            "unexplained": "no known cause explains what the model gets wrong" + left,
+            "undecided": f"{nrmse:.1%} of the output is unaccounted for; {_unknown(noise)}; "
+                         "record the sensor at rest too, or repeat the same motion, or state its "
+                         "noise (--noise-std)"}[verdict]
+
+
+def set_aside(aside, valid):
+    """Words for the samples that were not judged."""
+    share = aside.sum() / valid.sum()
+    return f"; {aside.sum()} samples ({share:.2%}) do not count: a signal stood still or had " \
+           "spikes there" if aside.any() else ""
+
+
+def _unknown(noise):
+    if noise.rms is None:
+        return "nothing in the record shows that it is noise"
+    return f"the noise that is established ({noise.rms:.3g} RMS, by {noise.by}) is less than that"
+
+
+def gain_words(cause, g, margin, instead):
+    words = [f"held-out error {g.before:.4g} without it, {g.after:.4g} with it "
+             f"({g.reduction:.1%} less, 95 % interval {g.ci95[0]:.1%} to {g.ci95[1]:.1%})"]
+    if instead:
+        words.append(f"nearest rival: {' with '.join(instead)}, fits worse by {margin:.2g} σ²")
+    return words
