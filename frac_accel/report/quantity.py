@@ -68,6 +68,6 @@ def left_open_by(parameters, core):
         Core of the model that they belong to.
     """
     positive = {field.name for field in parameter_fields(type(core))
-                if field.metadata["above"] == 0}
+                if field.metadata.get("above") == 0}
     return {name for name, entry in parameters.items()
             if name in positive and entry["std"] > abs(entry["value"])}
