@@ -14,7 +14,7 @@ _AS_WELL = 10.0
 
 def flat_instead(record, column, used, model, opened, seed, limit=None):
     """A gain with one link that explains far more than the oscillator that was identified, or as
-    much with one parameter less.
+    much with fewer parameters.
 
     A filter of the conditioner has no resonance, but an oscillator bends itself to look like it,
     and every cause that is then found makes up for what it cannot.
@@ -48,9 +48,11 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
     fits = engine.search.fit_all([
         engine.search.begun(start, cause, begin)
         for _, cause, begin in engine.search.screen(start)[:_FITTED]], start.cost)
-    # with one parameter less, as well is better: an oscillator that is damped beyond all is a lag
+    # as well with fewer parameters is better: an oscillator that is damped beyond all is a lag
     as_well = (1 + _AS_WELL / own.problem.count) * before.cost
-    if not fits or fits[0].cost > max(_FAR_LESS * before.cost, as_well):
+    found = next((fit for fit in fits if fit.cost <= _FAR_LESS * before.cost
+                  or (fit.size < before.size and fit.cost <= as_well)), None)
+    if found is None:
         return None
-    return flat, {cause: effect for cause, effect in fits[0].effects.items()
+    return flat, {cause: effect for cause, effect in found.effects.items()
                   if cause not in engine.search.base}
