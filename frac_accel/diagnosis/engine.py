@@ -327,6 +327,12 @@ class Engine:
             self._learnt[fitted.causes] = part.fit(fitted.effects, iterations=6)
         return self._learnt[fitted.causes]
 
+    def predicts_better(self, fitted):
+        """Whether a fit predicts the held-out part better than the model in use describes it."""
+        bare = self.search.fit(self.search.base)
+        return gain(*((self.problem.measured - fit.output)[self.held_out_rows]
+                      for fit in (bare, self.learnt(fitted)))).is_relevant
+
     def coarse_step(self, fitted):
         """Step of the values' lattice where that accounts for much of a residual, or None."""
         much = self._step and self._step**2 / 12 > _COARSE * fitted.cost / self.problem.count

@@ -239,15 +239,20 @@ def _refitted(engine, best, named):
     """
     base, named, dropped = engine.search.base.keys(), named & best.effects.keys(), {}
     fitted, stds = best, engine.uncertainties(best)
-    while named != fitted.causes - base:
-        fitted = engine.search.to_its_best(engine.search.fit(
-            {c: e for c, e in best.effects.items() if c in named or c in base}))
-        stds = engine.uncertainties(fitted)
-        takes = {cause: engine.rms(engine.added(fitted, cause)) for cause in fitted.causes - base}
-        found = {**by_what_is_left(engine, fitted, takes, engine.left(fitted)),
-                 **left_open(engine, fitted, stds, takes)}
+    while True:
+        if named != fitted.causes - base:
+            fitted = engine.search.to_its_best(engine.search.fit(
+                {c: e for c, e in best.effects.items() if c in named or c in base}))
+            stds = engine.uncertainties(fitted)
+            takes = {c: engine.rms(engine.added(fitted, c)) for c in fitted.causes - base}
+            found = {**by_what_is_left(engine, fitted, takes, engine.left(fitted)),
+                     **left_open(engine, fitted, stds, takes)}
+        elif named and not engine.predicts_better(fitted):
+            found = dict.fromkeys(named, "the causes that are found predict held-out data no "
+                                         "better than the model in use describes them")
+        else:
+            return fitted, stds, dropped
         named, dropped = named - found.keys(), {**dropped, **found}
-    return fitted, stds, dropped
 
 
 def _described(engine, fitted, after, parts):

@@ -465,7 +465,12 @@ class Problem:
         model = self.axis_model(point.effects)
         crossed = any(effect.stage == CROSS_AXIS for effect in model.effects)
         if forced and (crossed or not fit.rough):
-            before = self.simulate(point.effects, False, steps)
+            try:
+                before = self.simulate(point.effects, False, steps)
+            except FracAccelError:
+                # with fewer steps a motion at its limit has no bound
+                steps = _STEPS
+                before = self.simulate(point.effects, False, steps)
         for i, unknown in enumerate(fit.unknowns):
             sides = []
             for step in (unknown.step, -unknown.step):

@@ -46,7 +46,7 @@ def legible(values):
     size = np.where((values == 0) | ~np.isfinite(values), 1.0, np.abs(values))
     unit = 10.0**(np.floor(np.log10(size)) - _DIGITS + 1)
     # divided by a power of ten, a whole number is written without a tail of nines
-    return np.where(unit < 1, np.round(values / unit) / np.round(1 / unit),
+    return np.where(unit < 1, np.round(values / unit) / np.maximum(np.round(1 / unit), 1),
                     np.round(values / unit) * unit)
 
 
