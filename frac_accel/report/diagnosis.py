@@ -11,6 +11,8 @@ from .signals import sentence
 
 # Share of what is left from which a part of the error budget is shown.
 _SHOWN = 0.001
+# Share of what is left that a part must have for it to be no noise alone.
+_NO_NOISE = 0.1
 _VERDICTS = {"consistent": "Consistent", "explained": "Explained",
              "partly_explained": "Partly explained", "unexplained": "Unexplained",
              "undecided": "Undecided", "insufficient_data": "Insufficient data"}
@@ -59,7 +61,7 @@ def _verdict(section, found):
     before, after = found.baseline, found.extended
     section.text(
         f"On held-out data the model in use is wrong by {before['rmse']:.4g} output units (RMS), "
-        f"{percent(before['nrmse'])} of the output; {before['noise_rms']:.4g} may be noise.")
+        f"{percent(before['nrmse'])} of the output; {_noise(found)}.")
     section.items(_short(finding) for finding in found.findings)
     if found.findings:
         section.text(
@@ -107,7 +109,19 @@ def _short(finding):
             f"{finding.gain.reduction:.1%} less.")
 
 
+def _noise(found):
+    noise = found.established_noise
+    return f"{noise['rms']:.4g} is noise, by {noise['by']}" if noise["by"] \
+        else f"{found.baseline['noise_rms']:.4g} may be noise"
+
+
 def _unexplained(found):
+    known = {entry["part"]: entry["share"] for entry in found.budget
+             if entry["of"] == "extended" and entry["part"] != "noise" and entry["ci95"][0] > 0}
+    part = max(known, key=known.get, default=None)
+    if part and known[part] > _NO_NOISE:
+        return (f"What is left is no noise alone: {percent(known[part])} of its power is {part} "
+                f"({WORDS[part]}).")
     if not found.unexplained_fraction:
         return "What is left does not differ from noise."
     return (f"{percent(found.unexplained_fraction)} of the error's power above the noise stays "
