@@ -33,6 +33,8 @@ class Seen:
         Samples that are there, and those of them that the fit counted.
     is_coarse : bool
         Whether the values' lattice accounts for much of what is left.
+    parts : dict of str to float
+        Error budget of what is left: shares by part.
     """
 
     record: object
@@ -43,6 +45,7 @@ class Seen:
     rows: np.ndarray
     used: np.ndarray
     is_coarse: bool
+    parts: dict
 
     def at_stamps(self):
         """Instants with a sample, and the simulated output at the stamps that these carry."""
@@ -78,7 +81,8 @@ def read_off(engine, fitted, found, shown, sensor):
     rows = p.record.valid.copy()
     rows[:64] = rows[-64:] = False
     seen = Seen(p.record, found, sensor, p.measured, fitted.output, rows, rows & p.used,
-                engine.coarse_step(fitted) is not None)
+                engine.coarse_step(fitted) is not None,
+                {entry["part"]: entry["share"] for entry in engine.budget(fitted).parts})
     # what the size of a residual tells presumes that it is noise, or bursts of it
     parts = engine.structure(fitted)
     is_noise = all(part == "bursts" for _, part in parts) \

@@ -21,6 +21,10 @@ _GOES_ON = 0.2
 # much more than chance gives, and at most so much.
 _UNRELATED = 0.15
 _AT_MOST = 0.5
+# Standard deviations by which the motion's rank in bursts may exceed that at any time.
+_DEVIATIONS = 4.0
+# Share of the error budget that bursts must have.
+_SHOWN = 0.01
 # Share of the samples in bursts that may repeat the one before them: a sensor that is stuck.
 _REPEATED = 0.5
 # Share of what two noises gain that a noise which grows with the motion may gain.
@@ -55,7 +59,8 @@ class InterferenceBursts(Effect):
         if len(error) < 10 * _WINDOW:
             return None
         noise, loud, share, better = _two_noises(error)
-        if not 0 < share < _MOST or loud < _LOUDER**2 * noise or better < _BETTER:
+        if seen.parts.get("bursts", 0.0) < _SHOWN or not 0 < share < _MOST \
+                or loud < _LOUDER**2 * noise or better < _BETTER:
             return None
         inside = _in_bursts(error, noise, loud, share)
         starts = np.flatnonzero(np.diff(np.r_[0, inside.astype(int)]) == 1)
@@ -80,7 +85,7 @@ def _two_noises(error):
     A. P. Dempster, N. M. Laird, D. B. Rubin, *J. R. Stat. Soc. B* 39 (1977) 1-38.
     """
     squares = error**2
-    quiet = np.median(squares) / 0.4549  # that of a squared normal variable
+    quiet = _quiet(error)
     loud, share = max(10 * quiet, np.quantile(squares, 0.99)), 0.05
     for _ in range(_PASSES):
         weight = _weight(squares, quiet, loud, share)
@@ -93,6 +98,11 @@ def _two_noises(error):
     two = np.sum(np.logaddexp(np.log1p(-share) - 0.5 * (np.log(quiet) + squares / quiet),
                               np.log(share) - 0.5 * (np.log(loud) + squares / loud)))
     return quiet, loud, share, float(two - one)
+
+
+def _quiet(error):
+    """Variance by the median, which is 0.4549 of that of a squared normal variable."""
+    return np.median(error**2) / 0.4549
 
 
 def _weight(squares, quiet, loud, share):
@@ -121,12 +131,17 @@ def _going_on(error, quiet):
 
 def _follows(inside, error, output, count):
     """Whether the bursts or the error in them have to do with the motion."""
+    from scipy.stats import rankdata
     slope = np.gradient(output)
     bend = np.gradient(slope)
     # as many stretches as long as a burst could be one, and as many in them are independent
     stretches, samples = count / inside.mean(), max(inside.sum() / _WINDOW, count)
     moving = output - output.mean()
     for values in (moving, slope, bend):
+        # bursts at any time meet any size of the motion
+        size = rankdata(np.abs(values)) / len(values)
+        if size[inside].mean() > 0.5 + _DEVIATIONS / np.sqrt(12 * count):
+            return True
         if abs(np.corrcoef(values**2, inside)[0, 1]) > _allowed(stretches):
             return True
         if abs(np.corrcoef(values[inside], error[inside])[0, 1]) > _allowed(samples):
@@ -137,7 +152,9 @@ def _follows(inside, error, output, count):
 def _grows(error, output):
     """How much better an error that grows with the motion, its slope or its bend is described."""
     slope = np.gradient(output)
-    constant = likelihood(error, np.full(len(error), np.mean(error**2)))
+    # outliers count little in either law: the rest may say the constant as well as the mean
+    constant = max(likelihood(error, np.full(len(error), power)) for power in
+                   (np.mean(error**2), _quiet(error)))
     found = []
     for values in (output - output.mean(), slope, np.gradient(slope)):
         noise, grown, _ = variance_law(error, values**2)
