@@ -209,7 +209,7 @@ class Engine:
         begun = [self.search.begun(rest, cause, begin) for cost, cause, begin in
                  self.search.screen(rest)[:_RIVALS]
                  if cause not in unwanted and self.promises(rest, cost)]
-        found = next(iter(self.search.fit_all(begun)), rest)
+        found = self.search.varied(next(iter(self.search.fit_all(begun)), rest))
         return found if rest.cost - found.cost > self.threshold(found) else rest
 
     def rivals(self, best, cause):

@@ -70,7 +70,8 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
     for cause, g in gains.items():
         mirror = best.effects[cause].mirrors
         rivals = [(margin, causes) for margin, causes in engine.rivals(best, cause)
-                  if not mirror or mirror not in causes]
+                  # what cannot be named does not stand in the way of what can
+                  if (not mirror or mirror not in causes) and not causes & doubted.keys()]
         margin, other = rivals[0] if rivals else (np.inf, frozenset())
         instead = sorted(other - best.causes)
         entry = Finding(best.effects[cause], stds[cause], _confidence(margin),

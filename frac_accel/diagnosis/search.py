@@ -120,6 +120,13 @@ class Search:
                 self._keep(trial)
         return sorted((self.fits[key] for key in trials), key=lambda fit: fit.cost)
 
+    def varied(self, fit):
+        """A known fit, or its like with another order or kind where that fits better."""
+        better = self._varied(fit)
+        if better is not fit:
+            self._keep(better)
+        return better
+
     def _varied(self, fit):
         """The best of a fit and its like with another of what no fit varies, such as an order."""
         tried = set()
