@@ -184,11 +184,10 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
         suspects += [_suspect({cause}, 0.0, "too much is left that it does not explain")
                      for cause in sorted(doubtful)]
         findings = [f for f in findings if f.cause not in doubtful]
-    named = {f.cause for f in findings}
-    complete = {c for c in best.effects if c not in engine.search.base} <= named
-    fitted, stds, dropped = _refitted(engine, best, named)
+    fitted, stds, dropped = _refitted(engine, best, {f.cause for f in findings})
     suspects += [_suspect({cause}, 0.0, words) for cause, words in dropped.items()]
     findings = [f for f in findings if f.cause not in dropped]
+    complete = fitted.causes == best.causes
     if not complete:
         findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
                     if f.cause in fitted.effects else f for f in findings]
@@ -205,7 +204,7 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
         """What the reference's own noise does not account for."""
         return np.sqrt(max(rms**2 - own**2, 0.0))
     # the record is all of it, not only the part that is held out
-    error = max(after, _rms(fitted.residual, p.used))
+    error = max(after, engine.rms(fitted.residual))
     accounted = is_accounted(beyond(min([error, *by_itself])), spread, noise)
     faulty = accounted and not is_accounted(
         beyond(_rms(p.measured - fitted.output, p.used | engine.aside)), spread, noise)
