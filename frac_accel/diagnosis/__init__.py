@@ -111,7 +111,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     found.words.extend(notes)
     used = record.valid & moving
     noise = reference_noise(record, column, used, _stated_noise(source[0], column))
-    if noise:
+    if noise and noise.bends:
         found = dataclasses.replace(found, reference_noise=noise, words=[*found.words, noise.words])
     shown = _shown(found, record.sensor[:, column])
     stray = used & spikes(record.sensor[:, column], record.reference[:, column])
@@ -146,6 +146,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
+    engine.reference_noise = noise
     engine.aside = stray | (record.valid & ~moving)
     _require_relation(engine, axis, seed)
     return judge(engine, engine.run(seed), found, shown, loose, source[1],

@@ -90,6 +90,8 @@ class Engine:
         # the record, and its samples that may count: of a very long one, more than are fitted
         self.record, self.wanted = record, used
         self.search = Search(self.problem, base, candidates, log)
+        # of the reference, where it shows too little to bend a fit: `ReferenceNoise` or None
+        self.reference_noise = None
         # what counts in no fit, since a signal was at fault there
         self.aside = np.zeros(len(record), bool)
         self.held_out_rows = self.problem.used & held_out(self.problem.record.reference[:, axis])
@@ -218,7 +220,8 @@ class Engine:
                  self.search.screen(rest)[:_RIVALS]
                  if cause not in unwanted and self.promises(rest, cost)]
         found = self.search.varied(next(iter(self.search.fit_all(begun)), rest))
-        return found if rest.cost - found.cost > self.threshold(found) else rest
+        # what was found beside the unwanted has met its rivals beside them only
+        return self.compete(found if rest.cost - found.cost > self.threshold(found) else rest)
 
     def rivals(self, best, cause):
         """Sets without a cause, no larger than the best, by score; (margin, causes)."""
@@ -284,8 +287,17 @@ class Engine:
         model = p.axis_model(fitted.effects)
         sensor = AxisModel(model.core, tuple(e for e in model.effects if not e.of_reference))
         density = sum(e.unknown_density(frequency) for e in model.effects if e.of_reference)
+        if self.reference_noise and not self.reference_noise.bends:
+            density = density + self.reference_noise.density(frequency)
         gain = np.abs(sensor.transfer_function(2j * np.pi * frequency))
         return float(np.sqrt(np.mean(gain**2 * density) * p.rate / 2))
+
+    def _passed_on(self, fitted):
+        """Share of a residual's power by noise of the reference that the model passes on, so that
+        what is left follows it; none where the reference counts behind a filter of that noise."""
+        if not self.reference_noise or self.reference_noise.bends:
+            return 0.0
+        return (self.by_reference(fitted) / max(self.rms(fitted.residual), 1e-300))**2
 
     def budget(self, fitted):
         """`Budget` of what a fit leaves, of all samples that are there."""
@@ -314,8 +326,9 @@ class Engine:
                 rounded = {entry["part"]: SCATTER * entry["share"] for entry in self._division.of(
                     *(values[self._parted] for values in
                       (error, fitted.output + error, fitted.output))).parts}
-            shares = [(entry["share"] - rounded.get(entry["part"], 0.0),
-                       entry["ci95"][0] - rounded.get(entry["part"], 0.0), entry["part"])
+            own = self._passed_on(fitted)
+            shares = [(entry["share"] - rounded.get(entry["part"], 0.0) - own,
+                       entry["ci95"][0] - rounded.get(entry["part"], 0.0) - own, entry["part"])
                       for entry in parts if entry["part"] != "noise"]
             self._structures[fitted.causes] = sorted(
                 ((share, part) for share, low, part in shares
@@ -445,5 +458,8 @@ class Engine:
         p = self.problem
         across = [signal for axis, signal in enumerate(p.record.reference.T)
                   if axis != p.axis and np.ptp(signal)]
-        return leftover(fitted.residual, fitted.simulated, p.used, across,
-                        self.coarse_step(fitted))
+        found = leftover(fitted.residual, fitted.simulated, p.used, across,
+                         self.coarse_step(fitted))
+        own = self._passed_on(fitted)
+        return dataclasses.replace(found, linear=max(found.linear - own, 0.0),
+                                   level=max(found.level - own, 0.0))

@@ -210,8 +210,10 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
     faulty = accounted and not is_accounted(
         beyond(_rms(errors, (engine.wanted | engine.aside) & np.isfinite(errors))), spread, noise)
     strange = engine.structure(fitted)
-    verdict = verdict_of(findings, suspects, complete, left.share, fraction, accounted,
-                         strange or faulty)
+    # beside a model that leaves nothing that stands out, what is only suspected is chance
+    plain = not findings and not strange and engine.left(fitted).share == 0
+    verdict = verdict_of(findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
+                         fraction, accounted, strange or faulty)
     effects = {**fitted.effects, **{f.cause: f.effect for f in findings}}
     described, after = _described(engine, fitted, after, {part for _, part in strange}) \
         if verdict in _INCOMPLETE else ({}, after)
@@ -222,7 +224,7 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
         verdict, reason_of(verdict, error / spread, noise, accounted, strange)
         + set_aside(engine.aside, engine.record.valid) + description
         + (f"; {min(own / error, 1.0)**2:.0%} of that power is what the reference's own noise hides"
-           if own > 0 else ""),
+           if own > 0.1 * error else ""),
         {"rmse": before, "nrmse": before / spread, "noise_rms": noise_rms},
         findings, suspects,
         {"rmse": after, "nrmse": after / spread},
