@@ -16,15 +16,15 @@ SLOW = """
 # Files whose tests draw many records or sensors: `make test` runs the first draw of each test, and
 # `make test-all` the others.
 MANY_DRAWS = """
-    axis_monitors backlash budget changes_in_time corrected_uncertainty core_response
-    corrector_uncertainty diagnosis_data_checks diagnosis_exchanged diagnosis_leftover
-    diagnosis_laws diagnosis_steps diagnosis_stretches diagnosis_truthful domains_agree
-    effects_correction effects_simulation effects_streaming empirical_link further_forces gap_coverage identify_arx
-    identify_auto identify_fractional identify_gain identify_general_equation identify_oscillator
-    identify_records inverse_design linear_causes misalignment output_variance plausibility
-    real_records record_orientation record_pairing reference_faults residual_causes rig_accuracy
-    rig_road rig_second_set rig_uncatalogued simulation_accuracy spring_uncertainty
-    streaming_identity
+    axis_monitors backlash budget changes_in_time core_response corrected_uncertainty
+    corrector_uncertainty diagnosis_data_checks diagnosis_exchanged diagnosis_laws
+    diagnosis_leftover diagnosis_steps diagnosis_stretches diagnosis_truthful domains_agree
+    effects_correction effects_simulation effects_streaming empirical_link further_forces
+    gap_coverage identify_arx identify_auto identify_fractional identify_gain
+    identify_general_equation identify_oscillator identify_records inverse_design linear_causes
+    misalignment output_variance plausibility real_records record_orientation record_pairing
+    reference_faults residual_causes rig_accuracy rig_road rig_second_set rig_uncatalogued
+    simulation_accuracy spring_uncertainty streaming_identity
 """.split()
 
 
