@@ -69,6 +69,7 @@ setup(
     ],
     extras_require={
         "bench": ["PyDynamic>=2.4"],  # what `frac_accel bench` compares with
+        "formats": ["rosbags>=0.10", "pyarrow", "asammdf>=8"],  # what `convert` reads and writes
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],  # ROS from wheels
         "test": ["pytest", "pytest-timeout", "rosbags"],  # the fast part of the suite
     },
