@@ -110,9 +110,9 @@ endif
 # uv, which takes a tenth of pip's time; pip where uv has no way to the index that pip is set up for.
 # empy comes as source only: setuptools first, then no build isolation, which would fetch another.
 $(venv)/.done: requirements/venv.txt
+	@echo "installing the pinned packages into $(venv)"
 	@found=$$(sh tools/find_python.sh 13 $(or $(PYTHON),$(pythons))) && \
 	    rm -rf $(venv) && "$$found" -m venv $(venv)
-	@echo "installing the pinned packages into $(venv)"
 	@sed -n '/^\(setuptools\|uv\)==/,/[^\\]$$/p' $< > $(venv)/first.txt
 	@{ $(python) -m pip install $(pinned) -r $(venv)/first.txt && \
 	    { $(venv)/bin/uv pip install --python $(python) --no-build-isolation $(pinned) -r $< || \
