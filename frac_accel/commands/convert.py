@@ -2,10 +2,8 @@
 
 The name of OUT says which: .mcap, .db3, .csv, .parquet, .mf4, .npz, or a new rosbag2 folder. The
 other commands read all of these as they are, where the columns of a table are named as topics
-(/imu/reference/x [m/s^2], and time [s] beside it). Where they are not, say here which is which:
-
-  frac_accel convert drive.csv -o drive.mcap --time t --time-unit ms --unit g \\
-      --map /imu/reference=ref --map /imu/data_raw=ax,ay,az
+(/imu/reference/x [m/s^2], and time [s] beside it). Where they are not, --map, --unit and --time say
+here which is which.
 
 Of several inputs all topics come together, by their stamps. TOPIC=FILE says which topic the columns
 x, y, z of a file are.
@@ -22,6 +20,12 @@ from ..io.outputs import guard
 from ._common import add_json, positive, write_json
 
 _TOPIC = re.compile(r"(?P<topic>/[\w/]+)=(?P<rest>.+)")
+
+EXAMPLES = """
+frac_accel convert drive.db3 -o drive.mcap
+frac_accel convert drive.csv -o drive.mcap --map /imu/reference=ref --map /imu/data_raw=ax --unit g
+frac_accel convert /imu/reference=a.npy /imu/data_raw=b.npy -o pair.mcap --rate 100 --unit g
+"""
 
 
 def add_arguments(parser):
