@@ -13,7 +13,6 @@ venv := .venv
 oldest := .venv-oldest
 python := $(venv)/bin/python
 numerical := -m pytest -n 2
-pinned := --require-hashes --no-deps
 # What an installer says is kept, and shown only where it fails.
 quietly = > $(venv)/install.log 2>&1 || { cat $(venv)/install.log; exit 1; }
 
@@ -114,9 +113,9 @@ $(venv)/.done: requirements/venv.txt
 	@found=$$(sh tools/find_python.sh 13 $(or $(PYTHON),$(pythons))) && \
 	    rm -rf $(venv) && "$$found" -m venv $(venv)
 	@sed -n '/^\(setuptools\|uv\)==/,/[^\\]$$/p' $< > $(venv)/first.txt
-	@{ $(python) -m pip install $(pinned) -r $(venv)/first.txt && \
-	    { $(venv)/bin/uv pip install --python $(python) --no-build-isolation $(pinned) -r $< || \
-	    $(python) -m pip install --no-build-isolation --use-pep517 $(pinned) -r $<; }; \
+	@{ $(python) -m pip install --require-hashes --no-deps -r $(venv)/first.txt && \
+	    { $(venv)/bin/uv pip install --python $(python) --no-build-isolation --require-hashes --no-deps -r $< || \
+	    $(python) -m pip install --no-build-isolation --use-pep517 --require-hashes --no-deps -r $<; }; \
 	    } $(quietly)
 	@for shell in sh bash; do cp tools/wheels_setup.sh $(venv)/local_setup.$$shell || exit; done
 	@echo "$(CURDIR) $$($(python) -V)" > $@

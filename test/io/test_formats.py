@@ -240,6 +240,20 @@ def test_damaged_files_are_refused_in_one_line(name, folder, capsys):
     assert name in line and "nobody has foreseen" not in line
 
 
+@pytest.mark.parametrize("end", ["npz", "parquet"])
+def test_small_files_that_unpack_to_too_much_are_refused(end, folder, monkeypatch):
+    import pyarrow
+    from pyarrow import parquet
+    monkeypatch.setattr("frac_accel.io.formats.columns._UNSUSPECTED_BYTES", 2**20)
+    nothing = np.zeros(10**6)
+    if end == "npz":
+        np.savez_compressed("in.npz", **{"time_s": nothing, "x [g]": nothing})
+    else:
+        parquet.write_table(pyarrow.table({"time_s": nothing, "x [g]": nothing}), "in.parquet")
+    with pytest.raises(BagError, match="unpacks to 16000"):
+        read_bag(f"in.{end}")
+
+
 def test_formats_that_cannot_be_written_are_refused(bag, folder, capsys):
     for name in ("out.xlsx", "out.npy"):
         assert main(["convert", str(bag), "-o", name]) == 2

@@ -6,7 +6,7 @@ cells, and stamps stay whole numbers.
 
 from ...errors import BagError
 from ..regular_file import open_regular
-from .columns import Group, columns_of
+from .columns import Group, columns_of, require_plausible_size
 
 _HEAD_BYTES = 64 * 1024
 
@@ -39,6 +39,8 @@ def read_csv(path):
 def read_parquet(path):
     """Group of a Parquet file; a column's unit may also stand in its field's metadata."""
     from pyarrow import parquet
+    about = parquet.read_metadata(path)
+    require_plausible_size(path, 8 * about.num_rows * about.num_columns)
     table = parquet.read_table(path)
     units = [(field.metadata or {}).get(b"unit", b"").decode() for field in table.schema]
     return [_group(table, units)]

@@ -7,17 +7,20 @@ these names, so that stamps, values and variances come back as they were.
 """
 
 import dataclasses
+import os
 import re
 from typing import NamedTuple
 
 import numpy as np
 
 from ...errors import BagError, FracAccelError
+from ..bag.mcap_file import allowed_bytes
 from ..cdr import Temperatures
 from ..samples import Samples
 from .units import acceleration_factor, celsius_offset, time_factor_ns
 
 _AXES = "xyz"
+_UNSUSPECTED_BYTES = 256 * 2**20
 _UNIT = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]]*)[\])]\s*$")
 _SUFFIX = re.compile(r"^(?P<name>.+)_(?P<unit>ns|us|ms|s)$")
 # "x", "/imu/data_raw/x", and as PlotJuggler exports it "/imu/data_raw/linear_acceleration/x".
@@ -95,6 +98,18 @@ class Wishes:
     time_unit: str = ""
     rate_hz: float = 0.0
     topic: str = "/imu/data_raw"
+
+
+def require_plausible_size(path, unpacked):
+    """Refuse a table that unpacks to far more than it has on the disk, before memory is taken.
+
+    Raises
+    ------
+    BagError
+    """
+    size = os.stat(path).st_size
+    if unpacked > allowed_bytes(size, 2**62, _UNSUSPECTED_BYTES):
+        raise BagError(f"{path}: unpacks to {unpacked} bytes, more than {size} on the disk can be")
 
 
 def topics_of(groups, wishes, where):

@@ -6,13 +6,14 @@ import zlib
 import numpy as np
 
 from ...errors import BagError
-from .columns import Group, columns_of, split_unit
+from .columns import Group, columns_of, require_plausible_size, split_unit
 
 
 def read_npz(path):
     """Group of an archive; topics may be of different lengths."""
     archive = _load(path)
     with archive:
+        require_plausible_size(path, sum(entry.file_size for entry in archive.zip.infolist()))
         try:
             arrays = {name: archive[name] for name in archive.files}
         except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
