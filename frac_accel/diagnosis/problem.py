@@ -140,9 +140,11 @@ class Fitted:
 
     @property
     def size(self):
-        """Number of parameters that were chosen: those fitted, and the orders and kinds tried."""
-        return len(self.unknowns) + sum(len(fixed_values(effect))
-                                        for effect in self.effects.values())
+        """Number of parameters that were chosen: those fitted, the orders and kinds tried, and the
+        constant and the drift that are free where a filter of the reference has lost them."""
+        return len(self.unknowns) + sum(
+            len(fixed_values(effect)) + 2 * bool(np.any(effect.poles() == 0))
+            for effect in self.effects.values())
 
     @functools.cached_property
     def jacobian(self):
