@@ -100,13 +100,14 @@ def values(count=40):
     return np.random.default_rng(3).normal(size=(count, 3)).round(6)
 
 
-def test_csv_of_a_german_instrument(folder):
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252"])
+def test_csv_of_a_german_instrument(encoding, folder):
     """Semicolons, decimal commas, remarks before the names, units in the second line."""
     rows = values()
     lines = ["# Messung 7", "Zeit;Referenz;Ax;Ay", "s;m/s²;g;g"]
     lines += [";".join(f"{x:.6f}".replace(".", ",") for x in (0.01 * i, *row))
               for i, row in enumerate(rows)]
-    (folder / "m.csv").write_text("\n".join(lines) + "\n")
+    (folder / "m.csv").write_text("\n".join(lines) + "\n", encoding=encoding)
     assert main(["convert", "m.csv", "-o", "m.mcap", "--time", "Zeit",
                  "--map", "/imu/reference=Referenz", "--map", "/imu/data_raw=Ax,-,Ay"]) == 0
     found = read_bag("m.mcap")
@@ -238,6 +239,26 @@ def test_damaged_files_are_refused_in_one_line(name, folder, capsys):
     assert main(["convert", name, "-o", "out.mcap"]) == 2
     line, = capsys.readouterr().err.splitlines()
     assert name in line and "nobody has foreseen" not in line
+
+
+@pytest.mark.parametrize("end", ["csv", "parquet", "npz", "mf4", "db3"])
+def test_damage_is_one_line_or_none(end, folder, capfd):
+    """Cut off, or with bytes changed: what cannot be read is refused, and nothing else is said."""
+    write_bag("whole.mcap", {"/imu/data_raw": random_samples(5, 60)})
+    assert main(["convert", "whole.mcap", "-o", f"whole.{end}"]) == 0
+    whole = (folder / f"whole.{end}").read_bytes()
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        damaged = np.frombuffer(whole, np.uint8).copy()
+        if seed % 3:
+            places = rng.integers(len(whole), size=(1, 5, 50)[seed % 3])
+            damaged[places] = rng.integers(256, size=len(places))
+        else:
+            damaged = damaged[:rng.integers(len(whole))]
+        (folder / f"in.{end}").write_bytes(damaged.tobytes())
+        capfd.readouterr()
+        assert main(["convert", f"in.{end}", "-o", "out.mcap"]) in (0, 2)
+        assert len(capfd.readouterr().err.splitlines()) <= 1
 
 
 @pytest.mark.parametrize("end", ["npz", "parquet"])

@@ -15,11 +15,11 @@ def read_csv(path):
     """Group of a table of text: comma, semicolon (then with decimal comma) or tab between cells.
 
     Lines that begin with ``#`` before the names are passed over, a second line without any number
-    is taken as the units.
+    is taken as the units. What is no UTF-8 is taken as Windows' Western European (cp1252).
     """
     from pyarrow import csv
     with open_regular(path) as file:
-        head = file.read(_HEAD_BYTES).decode("utf-8-sig", "replace").splitlines()
+        encoding, head = _decoded(file.read(_HEAD_BYTES))
     passed = next((i for i, line in enumerate(head) if line.strip() and line[0] != "#"), None)
     if passed is None:
         raise BagError(f"{path}: is empty")
@@ -30,7 +30,8 @@ def read_csv(path):
     has_units = any(units) and not any(map(_is_number, units))
     comma = delimiter == ";" and any("," in line for line in following[:3])
     table = csv.read_csv(
-        path, csv.ReadOptions(skip_rows=passed, skip_rows_after_names=int(has_units)),
+        path, csv.ReadOptions(skip_rows=passed, skip_rows_after_names=int(has_units),
+                              encoding=encoding),
         csv.ParseOptions(delimiter=delimiter),
         csv.ConvertOptions(decimal_point="," if comma else ".", strings_can_be_null=True))
     return [_group(table, units if has_units else ())]
@@ -71,6 +72,15 @@ def _table(topics):
         "frame_id": [content.frame_id] * len(content.stamps_ns),
         **{name: pyarrow.array(values, from_pandas=True) for name, values in columns_of(content)},
     }) for topic, content in topics.items()], promote_options="default")
+
+
+def _decoded(head):
+    """Encoding of a text by its first bytes, and its first lines."""
+    whole = head[:head.rfind(b"\n") + 1] or head
+    try:
+        return "utf8", whole.decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        return "cp1252", whole.decode("cp1252", "replace").splitlines()
 
 
 def _is_number(text):

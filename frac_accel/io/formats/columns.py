@@ -63,7 +63,7 @@ class Group(NamedTuple):
         """A group for each value of the column ``topic``, if there is one."""
         if "topic" not in self.columns:
             return [self]
-        topics = self.columns["topic"].values.astype(str)
+        topics = np.array([str(topic) for topic in self.columns["topic"].values.tolist()])
         groups = []
         for topic in dict.fromkeys(topics.tolist()):
             rows = topics == topic

@@ -1,7 +1,9 @@
 """Measurement data format of ASAM (MDF4), by asammdf: a channel group for each topic."""
 
 import datetime
+import gc
 import logging
+import sys
 
 import numpy as np
 
@@ -64,10 +66,19 @@ def _signal(signal, name, values, seconds):
 def _open(path):
     from asammdf import MDF
     logging.getLogger("asammdf").setLevel(logging.CRITICAL)
+    # what asammdf has half made complains when it goes, in lines of its own
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    words = ""
     try:
         return MDF(path)
     except Exception as error:  # as above
-        raise BagError(f"{path}: is no MDF file that asammdf can read: {_words(error)}") from None
+        words = _words(error)
+        error.__traceback__ = error.__context__ = None
+    finally:
+        if words:
+            gc.collect()
+        sys.unraisablehook = hook
+    raise BagError(f"{path}: is no MDF file that asammdf can read: {words}")
 
 
 def _words(error):

@@ -8,6 +8,10 @@ import numpy as np
 from ...errors import BagError
 from .columns import Group, columns_of, require_plausible_size, split_unit
 
+# What zipfile and numpy raise for damaged archives, foreign ones and encrypted ones.
+_UNREADABLE = (ValueError, OSError, EOFError, RuntimeError, NotImplementedError, zipfile.BadZipFile,
+               zlib.error)
+
 
 def read_npz(path):
     """Group of an archive; topics may be of different lengths."""
@@ -16,7 +20,7 @@ def read_npz(path):
         require_plausible_size(path, sum(entry.file_size for entry in archive.zip.infolist()))
         try:
             arrays = {name: archive[name] for name in archive.files}
-        except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        except _UNREADABLE as error:
             raise _unreadable(path, error) from None
     return [Group.of([column for name, array in arrays.items()
                       for column in _columns(path, name, array)])]
@@ -44,7 +48,7 @@ def write_npz(path, topics):
 def _load(path):
     try:
         return np.load(path, allow_pickle=False)
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+    except _UNREADABLE as error:
         raise _unreadable(path, error) from None
 
 
