@@ -1,4 +1,4 @@
-"""Which tests `make check` runs, and which of many draws `make test` spares."""
+"""Which tests `make check` and `colcon test` run, and which of many draws `make test` spares."""
 
 import pytest
 
@@ -26,6 +26,25 @@ MANY_DRAWS = """
     reference_faults residual_causes rig_accuracy rig_road rig_second_set rig_uncatalogued
     simulation_accuracy spring_uncertainty streaming_identity
 """.split()
+
+
+def is_colcon(config):
+    """Whether `colcon test` has called: it names its results after the package."""
+    return config.option.junitprefix == "frac_accel"
+
+
+def pytest_configure(config):
+    """Let `colcon test` run the fast part, unless it is told which."""
+    if is_colcon(config):
+        config.option.markexpr = config.option.markexpr or "fast"
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Of the other files `colcon test` needs no libraries."""
+    if is_colcon(config) and collection_path.suffix == ".py" \
+            and collection_path.stem.removeprefix("test_") not in FAST:
+        return True
+    return None
 
 
 def pytest_collection_modifyitems(items):
