@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from ..parameters import coefficients, parameter
 from .base import REFERENCE, Effect, Reading
@@ -31,6 +30,7 @@ class ReferenceNoise(Effect):
     share: tuple = coefficients()
 
     def change_base(self, values, sampling_rate_hz):
+        from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
         # it begins before the motion, by as much as its frequencies are apart
         length = next_fast_len(len(values) + int(2 * sampling_rate_hz / self.frequency_hz[1]),
                                real=True)
