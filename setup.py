@@ -45,7 +45,10 @@ setup(
         "plotly>=5.13",
         "numba>=0.57",  # simulation of nonlinear springs and friction
     ],
-    extras_require={"bench": ["PyDynamic>=2.4"]},  # what `frac_accel bench` compares with
+    extras_require={
+        "bench": ["PyDynamic>=2.4"],  # what `frac_accel bench` compares with
+        "completion": ["shtab>=1.9.2"],  # makes completion scripts of argparse, also for fish
+    },
     entry_points={
         "console_scripts": [
             "frac_accel = frac_accel.cli:main",

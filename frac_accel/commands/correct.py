@@ -26,6 +26,11 @@ from ._common import (
     write_json,
 )
 
+EXAMPLES = """
+frac_accel correct drive.mcap --model sensor.yaml -o corrected.mcap
+frac_accel correct drive.mcap --model sensor.yaml -o corrected.mcap --bandwidth 80 --max-delay 0.02
+"""
+
 
 def add_arguments(parser):
     """Options of the verb."""

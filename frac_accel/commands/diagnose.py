@@ -13,15 +13,19 @@ from ._common import (
     add_topics,
     open_bag,
     positive,
-    progress,
     provenance,
     require_report,
-    step,
+    share_done,
     write_json,
 )
 
 # Share of what is left from which a part of the error budget is told.
 _SHOWN = 0.01
+
+EXAMPLES = """
+frac_accel diagnose drive.mcap --model sensor.yaml --report found.html
+frac_accel diagnose drive.mcap --model sensor.yaml --extended-model better.yaml --json found.json
+"""
 
 
 def add_arguments(parser):
@@ -56,9 +60,9 @@ def run(arguments):
     elif arguments.temperature != TEMPERATURE_TOPIC:
         print(f"warning: {arguments.bag}: no topic {arguments.temperature}: what depends on "
               "temperature cannot be found", file=sys.stderr)
-    with progress(None, unit="step") as bar:
+    with share_done() as show:
         found = diagnose(arguments.bag, model, arguments.axis, temperature, arguments.reference,
-                         arguments.sensor, lambda words: step(bar, words),
+                         arguments.sensor, show,
                          arguments.noise_std, arguments.time_limit)
     print(table(found, arguments.axis))
     command = f"frac_accel diagnose {arguments.bag} --axis {arguments.axis}" + (

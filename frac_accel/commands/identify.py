@@ -6,6 +6,7 @@ mean, and whether they agree is said.
 
 from pathlib import Path
 
+from ..errors import naming
 from ..identification import STRUCTURES, identify
 from ..io.outputs import say
 from ..record import Record
@@ -17,12 +18,17 @@ from ._common import (
     add_topics,
     open_bag,
     printable,
-    progress,
     provenance,
     require_report,
-    step,
+    share_done,
     write_json,
 )
+
+EXAMPLES = """
+frac_accel identify bench.mcap -o sensor.yaml
+frac_accel identify monday.mcap tuesday.mcap -o sensor.yaml --report sensor.html
+frac_accel identify bench.mcap --axis z --reference /shaker/imu --sensor /seat/imu -o seat.yaml
+"""
 
 
 def add_arguments(parser):
@@ -43,16 +49,17 @@ def run(arguments):
     require_report(arguments.report)
     for bag in bags:
         open_bag(bag)
-    pairs = [Record.load(bag, arguments.reference, arguments.sensor, arguments.axis)
-             for bag in bags]
+    pairs = []
+    for bag in bags:
+        with naming(bag):
+            pairs.append(Record.load(bag, arguments.reference, arguments.sensor, arguments.axis))
     command = (f"frac_accel identify {' '.join(bags)} --structure {arguments.structure} "
                f"--reference {arguments.reference} --sensor {arguments.sensor} "
                f"--axis {arguments.axis}")
     source = _provenance(bags, command)
-    with progress(None, unit="step") as bar:
-        result = identify(pairs, arguments.axis, arguments.structure, source,
-                          lambda words: step(bar, words),
-                          [printable(Path(bag).name) for bag in bags])
+    with share_done() as show:
+        result = identify(pairs, arguments.axis, arguments.structure, source, show,
+                          [printable(bag) for bag in _told_apart(bags)])
     result.model.save(arguments.output)
     _print(result, pairs, bags)
     say(f"{arguments.output}: written")
@@ -62,6 +69,12 @@ def run(arguments):
         source = page.provenance
         say(f"{arguments.report}: written")
     write_json(arguments.json, {**result.as_dict(), "provenance": source})
+
+
+def _told_apart(bags):
+    """Names of the bags, with their folders where two are alike."""
+    names = [Path(bag).name for bag in bags]
+    return names if len(set(names)) == len(names) else bags
 
 
 def _print(result, pairs, bags):

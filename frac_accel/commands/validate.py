@@ -19,6 +19,11 @@ from ._common import (
 
 _HEADING = "           band [Hz]   NRMSE [%]  amplitude [%]  phase [deg]   peak [%]"
 
+EXAMPLES = """
+frac_accel validate other_day.mcap --model sensor.yaml
+frac_accel validate other_day.mcap --model sensor.yaml --axis z --report validated.html
+"""
+
 
 def add_arguments(parser):
     """Options of the verb."""

@@ -26,6 +26,7 @@ from .flat import flat_instead
 from .judgement import judge
 from .leftover import related
 from .spikes import spikes
+from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
 from .time_limit import TimeLimit
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
@@ -62,7 +63,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     reference, sensor : str
         Topics, where `source` is a bag.
     progress : callable, optional
-        Called with a few words before each step.
+        Called in each step with a few words and the share that is about done.
     noise_std : float, optional
         Standard deviation of the sensor's noise [output units], where it is known.
     time_limit_s : float
@@ -91,11 +92,11 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     """
     if noise_std is not None and not (np.isfinite(noise_std) and noise_std > 0):
         raise FracAccelError(f"noise_std: {noise_std} given, expected a number above 0")
-    progress = progress or (lambda words: None)
     limit = TimeLimit(time_limit_s)
+    stages = Stages(progress, limit)
     source = pair_of(source, sampling_rate_hz, axis, reference, sensor)
     column = AXES.index(axis)
-    progress("checking the data")
+    stages.enter("checking the data", CHECKED)
     record = Record.of(*source, axis, temperature)
     record, source, turned = _in_axes_of_reference(record, source, axis, temperature)
     found = record.integrity(column)
@@ -120,7 +121,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
                                 found)
     seed = None
     if model is None:
-        progress("identifying a classical model")
+        stages.enter("identifying a classical model", IDENTIFIED)
         try:
             require_excitation(record.reference[:, column], record.sampling_rate_hz, _COEFFICIENTS)
         except IdentificationError as error:
@@ -136,14 +137,16 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
             **{cause: effect for cause, effect in shown.items() if effect.of_reference}},
         candidates=[cause for cause, effect in known_effects().items()
                     if not effect.read_off and effect.acts_on(model.axis(axis).core)],
-        log=progress, step=found.step, limit=limit)
+        stages=stages, step=found.step, limit=limit)
     engine, stray = _without_spikes(engine, used, stray, record.reference[:, column])
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
     engine.aside = stray | (record.valid & ~moving)
     _require_relation(engine, axis, seed)
-    return judge(engine, engine.run(seed), found, shown, loose, source[1],
+    best = engine.run(seed)
+    stages.enter("judging what was found", JUDGED)
+    return judge(engine, best, found, shown, loose, source[1],
                  noise_std)
 
 

@@ -22,6 +22,7 @@ from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
 from .problem import Problem
 from .search import Search
+from .stages import COMPARED
 
 # Improvement, in variances of one sample's noise and for each parameter, that chance does not give.
 _CHANCE = 30.0
@@ -79,14 +80,14 @@ class Engine:
     The measured values may have a lattice with a known `step`.
     """
 
-    def __init__(self, record, axis, baseline, used, base=None, candidates=(), log=None, step=None,
-                 limit=None):
+    def __init__(self, record, axis, baseline, used, base=None, candidates=(), stages=None,
+                 step=None, limit=None):
         self.problem = Problem(record, axis, baseline, used, limit)
         self.part = None
         self.uncontested, self.best = set(), None
         self._step = step
         self._wanted = used
-        self.search = Search(self.problem, base, candidates, log)
+        self.search = Search(self.problem, base, candidates, stages)
         # what counts in no fit, since a signal was at fault there
         self.aside = np.zeros(len(record), bool)
         self.held_out_rows = used & self.problem.used & held_out(record.reference[:, axis])
@@ -123,7 +124,7 @@ class Engine:
             # where the motion is strongest is enough to find most causes, and to judge them
             rows = strongest_stretch(p.record.reference[:, p.axis], _LONG // 2)
             self.part = Engine(p.record.part(rows), p.axis, p.baseline, self._wanted[rows],
-                               self.search.base, self.search.candidates, self.search.log,
+                               self.search.base, self.search.candidates, self.search.stages,
                                self._step, p.limit)
             return self.part.run(seed)
         self.best = self.compete(self.search.run(self.threshold, self.promises, self.noise_only,
@@ -151,6 +152,7 @@ class Engine:
         for _ in range(4):
             unexplained = self.unexplained(best)
             for cause in best.effects:
+                self.search.stages.enter_round(f"comparing {cause} with its rivals", COMPARED)
                 # nothing takes the place of one that is too weak to be named
                 if cause in self.search.base or \
                         self.rms(self.added(best, cause)) < WEIGHS * unexplained:

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from ...errors import FracAccelError, IdentificationError
+from ...errors import FracAccelError, IdentificationError, naming
 from ..fit.structures import OscillatorStructure
 from ..fit.uncertainty import SIGNIFICANT
 from ..response.excitation import excited_band
@@ -153,10 +153,14 @@ def _explains(classical, fractional, datas):
 
 def _combined(name, datas, records):
     """Candidate of all records together and their RecordAgreement."""
-    structure, first = fitted(name, datas[0])
+    with naming(records[0]):
+        structure, first = fitted(name, datas[0])
     # the orders of a transfer function must be the same in all
-    start = first.unknowns if name == "arx" else None
-    fits = [first, *(fit_of(structure, data, start) for data in datas[1:])]
+    start, fits = first.unknowns if name == "arx" else None, [first]
+    for record, data in zip(records[1:], datas[1:]):
+        data.progress(f"fitting the {name} structure to {record}")
+        with naming(record):
+            fits.append(fit_of(structure, data, start))
     datas[0].progress(f"judging the {name} structure on the other records")
     table = [[data.predicted(structure, fit, _settled(structure, fit, data)) for data in datas]
              for fit in fits]
