@@ -26,3 +26,9 @@ class Shown:
         self.plot().savefig(image, format="png", dpi=90)
         data = base64.b64encode(image.getvalue()).decode()
         return f'<p>{html.escape(repr(self))}</p><img src="data:image/png;base64,{data}">'
+
+
+def above(axes: Any) -> None:
+    """Put the legend of a matplotlib Axes above it, where it hides no peak."""
+    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=4, frameon=False, fontsize="small",
+                borderaxespad=0.2)

@@ -6,6 +6,7 @@ from ..diagnosis import diagnose
 from ..io.bag import TEMPERATURE_TOPIC, read_temperature
 from ..io.outputs import say
 from ..model import SensorModel
+from ..report.quantity import written
 from ._common import (
     add_bag,
     add_json,
@@ -96,9 +97,7 @@ def table(found, axis):
     for finding in found.findings:
         lines.append(f"{finding.cause}: {finding.effect.explanation}")
         for name, entry in finding.as_dict()["parameters"].items():
-            value, std = entry["value"], entry["std"]
-            lines.append(f"  {name:21} {value:>12}" if not entry["unit"] else
-                         f"  {name:21} {value:12.6g} +- {std:.2g} {entry['unit']}")
+            lines.append(f"  {name:21} {written(entry['value'], entry['std'], entry['unit'])}")
         lines += [f"  {words}" for words in finding.evidence]
     for suspect in found.suspects:
         lines += [f"suspected: {' or '.join(suspect['causes'])}: {suspect['reason']}",

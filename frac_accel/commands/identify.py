@@ -11,7 +11,7 @@ from ..identification import STRUCTURES, identify
 from ..io.outputs import say
 from ..record import Record
 from ..report.identification import identification_page
-from ..report.quantity import left_open_by
+from ..report.quantity import left_open_by, written
 from ._common import (
     add_json,
     add_report,
@@ -88,7 +88,7 @@ def _print(result, pairs, bags):
     left_open = left_open_by(result.parameters, result.model.core)
     for name, entry in result.parameters.items():
         words = "open: these data do not determine it" if name in left_open \
-            else f"{entry['value']:12.6g} +- {entry['std']:.2g} {entry['unit']}"
+            else written(entry["value"], entry["std"], entry["unit"])
         print(f"  {name:21} {words}")
     print(f"  residual {result.nrmse:.3%} of the output, {result.held_out_nrmse:.3%} on held-out "
           "data")

@@ -13,7 +13,7 @@ from ..io.samples import Samples
 from ..model import AXES, SensorModel
 from ..record import Record
 from ..record.sources import pair_of
-from ..shown import Shown
+from ..shown import Shown, above
 from ..signals.metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
 from ..signals.thinning import envelope
 from ..simulation import simulate
@@ -79,7 +79,7 @@ class Validation(Shown):
                                        "corrected": seen.after - seen.reference})):
             for name, values in signals.items():
                 axes.plot(*envelope(time, values), label=name, linewidth=0.8)
-            axes.legend(loc="upper right")
+            above(axes)
         upper.set_ylabel("acceleration [m/s²]")
         lower.set(xlabel="time [s]", ylabel="error [m/s²]")
 

@@ -77,7 +77,7 @@ def flat_instead(data):
                "its parameters are open, and a gain is all that can be said")
     else:
         return None
-    place = f"at {resonance:.4g} +- {std:.2g} Hz" if std < resonance else "at any frequency above"
+    place = f"at {resonance:.4g} ± {std:.2g} Hz" if std < resonance else "at any frequency above"
     return flat, (f"no resonance shows up to {highest:.4g} Hz: an oscillator {place} {why} "
                   f"(held-out residual "
                   f"{classical.held_out_nrmse:.3%} against {flat.held_out_nrmse:.3%})")
@@ -124,7 +124,7 @@ def _preferred(classical, fractional, datas, judged):
     """The better of two candidates of the same records, and why."""
     order = fractional.fit["damping_order"]
     std = fractional.fit.std[fractional.fit.names.index("damping_order")]
-    score = f"damping order {order:.4g} +- {std:.2g}"
+    score = f"damping order {order:.4g} ± {std:.2g}"
     held_out = (f"{judged} {fractional.held_out_nrmse:.3%} against "
                 f"{classical.held_out_nrmse:.3%} of the classical model")
     if abs(order - 1) <= SIGNIFICANT * std:
