@@ -5,24 +5,33 @@ are. Samples that cannot be corrected (the filter's warm-up, bad stamps or value
 """
 
 import collections
+import dataclasses
 
 import numpy as np
 
-from ..errors import BagError
-from ..io.bag import CORRECTED_TOPIC, BagWriter, cdr
+from ..correction.design import plateau
+from ..errors import BagError, FracAccelError
+from ..io.bag import CORRECTED_TOPIC, BagWriter, cdr, read_bag
 from ..io.motion import MovedMotion
-from ..model import SensorModel
+from ..io.outputs import say
+from ..model import AXES, SensorModel
+from ..report.correction import BeforeAfter, correction_page, filter_words
+from ..report.quantity import percent
 from ..streaming import Corrector
+from ..validation import compare
 from ._common import (
     add_bag,
     add_filter,
     add_json,
     add_model,
+    add_report,
     add_temperature,
     add_topics,
     filter_wishes,
     open_bag,
     progress,
+    provenance,
+    require_report,
     write_json,
 )
 
@@ -42,11 +51,13 @@ def add_arguments(parser):
     parser.add_argument("--corrected", default=CORRECTED_TOPIC, metavar="TOPIC",
                         help="topic of the corrected samples (default: %(default)s)")
     add_filter(parser)
+    add_report(parser)
     add_json(parser)
 
 
 def run(arguments):
     """Do it."""
+    require_report(arguments.report)
     corrector = Corrector(SensorModel.load(arguments.model), **filter_wishes(arguments))
     reader = open_bag(arguments.bag)
     raw = reader.topic(arguments.sensor, cdr.ACCELERATION_TYPES)
@@ -59,7 +70,8 @@ def run(arguments):
         for name in copied:
             writer.copy_topic(reader.topics[name])
         writer.copy_topic(raw, arguments.corrected)
-        sink = _Sink(corrector, writer, raw.type_name, arguments.corrected, temperatures)
+        sink = _Sink(corrector, writer, raw.type_name, arguments.corrected, temperatures,
+                     bool(arguments.report))
         for block in reader.blocks(copied):
             messages = block.messages
             writer.write_many(block.topic.name, list(zip(
@@ -90,8 +102,45 @@ def run(arguments):
               "Hz".format(corrector.design.extrapolated_below_hz, *corrector.model.band_hz))
     print(f"  filter delay {summary['filter_delay_s']:.4g} s; sensor's own delay "
           f"{summary['sensor_delay_s']:.4g} s, taken out of the stamps")
+    if arguments.report:
+        _page(sink.kept(), reader, corrector, arguments).write(arguments.report)
+        say(f"{arguments.report}: written")
     write_json(arguments.json, {"output": str(arguments.output), "counters": counters,
                                 "filters": summary, "warnings": [*reader.warnings, *notes]})
+
+
+def _page(kept, reader, corrector, arguments):
+    """Page of before and after, with errors where the bag has a reference to compare with."""
+    raw, index, corrected = kept
+    design, summary = corrector.design, corrector.design.summary()
+    reference = read_bag(arguments.bag, [arguments.reference])[arguments.reference] \
+        if arguments.reference in reader.topics else None
+    words, seen = [f"{corrector.counters['given']} of {corrector.counters['samples']} samples "
+                   f"corrected at {summary['sampling_rate_hz']:.6g} Hz."], []
+    for column, axis in enumerate(AXES):
+        if not np.ptp(corrected.values[:, column]):
+            words.append(f"Axis {axis} does not move, and is not shown.")
+            continue
+        words.append(filter_words(axis, summary))
+        drawn = BeforeAfter(
+            axis, summary["sampling_rate_hz"], corrected.stamps_ns,
+            raw.values[index, column] / plateau(design.model.axis(axis), design.model.band_hz),
+            corrected.values[:, column], np.sqrt(corrected.variance[:, column]),
+            summary["axes"][axis]["band_hz"])
+        try:
+            if reference is not None:
+                found = compare(reference, raw, corrected, design, axis)
+                drawn = dataclasses.replace(
+                    drawn, stamps_ns=found.stamps_ns, before=found.before, after=found.after,
+                    std=found.std, reference=found.reference)
+                words.append(f"Axis {axis}: NRMSE {percent(found.scaled.total.nrmse)} before, "
+                             f"{percent(found.corrected.total.nrmse)} after correction.")
+        except FracAccelError as error:
+            words.append(f"Axis {axis} is shown without its reference: {error}.")
+        seen.append(drawn)
+    source = provenance(arguments.bag, f"frac_accel correct {arguments.bag} --model "
+                        f"{arguments.model} --sensor {arguments.sensor}")
+    return correction_page("Correction", seen, words, source, corrector.model)
 
 
 def _temperatures(reader, topic, model):
@@ -122,7 +171,8 @@ def fates(counters):
 class _Sink:
     """Runs raw blocks through the corrector and writes what becomes ready."""
 
-    def __init__(self, corrector, writer, type_name, topic, temperatures):
+    def __init__(self, corrector, writer, type_name, topic, temperatures, keeps=False):
+        self._keeps, self._raw, self._ready = keeps, [], []
         self._corrector, self._writer = corrector, writer
         self._temperatures = collections.deque(temperatures)
         self._type, self._topic = type_name, topic
@@ -137,9 +187,11 @@ class _Sink:
                 samples = cdr.read_point_cloud(data)
                 self._frame, self._log = samples.frame_id, log
                 self._tell_temperature(log)
+                self._keep_raw(samples)
                 self._write_cloud(self._corrector.process(samples.stamps_ns, samples.values))
             return
         samples = block.samples()
+        self._keep_raw(samples)
         self._waiting.extend(zip(messages, block.log_times_ns.tolist()))
         logs, start = block.log_times_ns, 0
         while start < len(logs):
@@ -156,11 +208,28 @@ class _Sink:
         while self._temperatures and self._temperatures[0][0] <= log_time_ns:
             self._corrector.set_temperature(self._temperatures.popleft()[1])
 
+    def _keep_raw(self, samples):
+        if self._keeps:
+            self._raw.append(samples)
+
+    def _keep(self, ready):
+        if self._keeps and len(ready):
+            self._ready.append(ready)
+
+    def kept(self):
+        """Raw samples, which of them were corrected, and the corrected ones."""
+        index = np.concatenate([ready.index for ready in self._ready])
+        corrected = cdr.Samples.of(*(np.concatenate([getattr(ready, name) for ready in
+                                                     self._ready])
+                                     for name in ("stamps_ns", "values", "variance")))
+        return cdr.Samples.concatenate(self._raw), index, corrected
+
     def finish(self):
         rest = self._corrector.finish()
         (self._write_cloud if self._type == cdr.POINT_CLOUD2 else self._write)(rest)
 
     def _write(self, ready):
+        self._keep(ready)
         if not len(ready):
             return
         # a sample that was never given out is dropped when a later one is
@@ -174,6 +243,7 @@ class _Sink:
         self._writer.write_many(self._topic, list(zip(patched, logs, logs)))
 
     def _write_cloud(self, ready):
+        self._keep(ready)
         if len(ready):
             block = cdr.Samples.of(ready.stamps_ns, ready.values, np.full(ready.values.shape,
                                                                           np.nan), self._frame)

@@ -26,8 +26,7 @@ def discrepancy(section, found):
 
 def _in_time(section, seen):
     whole = seen.signals["whole"]
-    section.figure(figures.time_signals(None, whole["output"], whole["residual"],
-                                        is_thinned=seen.samples > MOST_POINTS),
+    section.figure(figures.time_signals(None, whole["output"], whole["residual"]),
                    "Sensor's output, measured and simulated from the reference, and the residuals "
                    "(measured less simulated)" + thinned(seen.samples, MOST_POINTS))
     part = seen.signals.get("close_up")

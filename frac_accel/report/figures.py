@@ -180,7 +180,7 @@ def mark_band(figure, band_hz):
     return figure
 
 
-def time_signals(time_s, signals, residual=None, unit="output units", is_thinned=False):
+def time_signals(time_s, signals, residual=None, unit="output units"):
     """Signals over time, and below them what is left.
 
     Parameters
@@ -191,17 +191,14 @@ def time_signals(time_s, signals, residual=None, unit="output units", is_thinned
     residual : ndarray, shape (n,), or dict of str to ndarray, optional
         A dict where several signals have one each, by their names, arrays or pairs as well.
     unit : str
-    is_thinned : bool
-        Whether pairs hold the extremes of a longer signal.
 
     Returns
     -------
     plotly.graph_objects.Figure
     """
     def draw(values, row, name, colour, legend=True, width=1.4):
-        was_thinned = isinstance(values, tuple)
-        x, y = values if was_thinned else (time_s, values)
-        panels.signal(figure, x, y, row, name, colour, legend, width, was_thinned and is_thinned)
+        x, y = values if isinstance(values, tuple) else (time_s, values)
+        panels.signal(figure, x, y, row, name, colour, legend, width)
     rows = 1 if residual is None else 2
     labels = [f"output<br>[{unit}]", f"residual<br>[{unit}]"][:rows]
     figure = panels.rows(rows, 280 + 200 * (rows - 1), "time [s]", labels,

@@ -180,11 +180,11 @@ def _frequency_domain(section, result):
 
 
 def _residual(section, seen, noise):
-    def drawn(view, is_thinned=False):
+    def drawn(view):
         signals = dict(seen.signals[view])
         residual = signals.pop("residual")
-        return figures.time_signals(None, signals, residual, is_thinned=is_thinned)
-    section.figure(drawn("whole", seen.samples > MOST_POINTS),
+        return figures.time_signals(None, signals, residual)
+    section.figure(drawn("whole"),
                    "Sensor's output, measured and by the model, and the residual"
                    + thinned(seen.samples, MOST_POINTS))
     if "close_up" in seen.signals:

@@ -7,7 +7,6 @@ import textwrap
 
 import numpy as np
 
-from ..signals.thinning import MOST_POINTS, envelope
 from .page import require_plotly
 
 MEASURED = "#8a919a"
@@ -20,8 +19,9 @@ COVERAGE_FACTOR = 2.0
 _FONT = "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif"
 # Characters of an axis title that a phone shows in one line, along a panel and beneath it.
 _UPRIGHT, _LEVEL = 24, 34
-# Columns in which the ends of a long signal are drawn: half the pixels of a wide page.
-_COLUMNS = 400
+# Samples above which a signal is drawn by its ends, and columns that these are drawn in: half the
+# pixels of a wide page.
+MOST_IN_LINE, _COLUMNS = 1600, 400
 # Decades of an axis up to which 1, 2 and 5 are labelled, and not only the powers of ten.
 _FEW_DECADES = 3.2
 
@@ -69,15 +69,15 @@ def line(figure, x, y, row, name, colour, legend=True, dash="solid", width=1.4):
         line={"color": colour, "width": width, "dash": dash})
 
 
-def signal(figure, x, y, row, name, colour, legend=True, width=1.4, is_thinned=False):
+def signal(figure, x, y, row, name, colour, legend=True, width=1.4):
     """Add a signal: a line, or where it is long its lower and upper end with what is between.
 
     A line through all extremes of a long signal would hide whatever is behind it.
     """
-    if not is_thinned and len(y) <= MOST_POINTS:
+    if len(y) <= MOST_IN_LINE:
         line(figure, x, y, row, name, colour, legend, width=width)
         return
-    x, low, high = ends(*((x, y) if is_thinned else envelope(x, y)))
+    x, low, high = ends(x, y)
     group = f"{name} {row}"
     add(figure, row, x=x, y=low, mode="lines", name=f"{name}, lower end", showlegend=False,
         legendgroup=group, hoverinfo="skip", line={"width": 0.7, "color": colour})
