@@ -47,12 +47,14 @@ setup(
     ],
     extras_require={
         "bench": ["PyDynamic>=2.4"],  # what `frac_accel bench` compares with
+        "watch": ["rich"],  # the live table of `frac_accel watch`; rosdep key python3-rich
         "completion": ["shtab>=1.9.2"],  # makes completion scripts of argparse, also for fish
     },
     entry_points={
         "console_scripts": [
             "frac_accel = frac_accel.cli:main",
             "corrector = frac_accel.nodes.corrector:main",
+            "managed_corrector = frac_accel.nodes.managed_corrector:main",
             "player = frac_accel.nodes.player:main",
             "recorder = frac_accel.nodes.recorder:main",
             "virtual_sensor = frac_accel.nodes.virtual_sensor:main",

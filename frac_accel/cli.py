@@ -21,6 +21,7 @@ VERBS = {
     "budget": "what is left, parted by kind, in seconds, without naming anything",
     "diagnose": "what a simulation gets wrong, the cause, the extension, the gain",
     "report": "the page of a diagnosis again, from its result file",
+    "watch": "live in the terminal: RMS, rate, latency and verdict of each sensor",
     "layout": "a layout for Foxglove or PlotJuggler, with the corrected samples' band",
     "paper": "the seed paper's tables and figures again, and the audit of its claims",
     "bench": "speed, latency and memory, beside peers in the same run",
