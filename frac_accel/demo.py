@@ -24,7 +24,7 @@ from .model.parameters import as_mapping
 from .record import Record
 from .report.identification import identification_page
 from .report.quantity import written
-from .shown import above
+from .shown import above, plain_logarithms
 from .streaming import Corrector
 from .validation import compare
 
@@ -141,6 +141,7 @@ def picture(results, path):
         errors.semilogy(time_s, np.abs(result.after - result.reference)[first], color="#3f9bd8",
                         lw=0.8)
         errors.set_ylabel("|error| [m/s²]")
+        plain_logarithms(errors)
     above(rows[0][0])
     rows[0][0].set_title(f"acceleration, first {_SHOWN_S} s", pad=20)
     rows[0][1].set_title("error before and after correction")
