@@ -54,6 +54,8 @@ def written(value, std, unit):
     '1.29994 ms ± 0.11 µs'
     >>> written(180.00328, 0.0094, "Hz"), written(0.149952, 4.8e-5, "1")
     ('180.0033 Hz ± 9.4 mHz', '0.149952 ± 0.000048')
+    >>> written(0.00024998, 5.8e-8, "1/m^2")
+    '(2.49980 ± 0.00058)e-04 1/m²'
     """
     if isinstance(value, str):
         return f"{value} {scaled(value, unit).unit}".rstrip()
@@ -67,7 +69,9 @@ def written(value, std, unit):
     if not spread:
         return f"{shown} {large.unit}".rstrip()
     if small == large:
-        return f"{shown} ± {spread} {large.unit}".rstrip()
+        number, mark, exponent = shown.partition("e")
+        both = f"{number} ± {spread.partition('e')[0]}"
+        return f"{f'({both})e{exponent}' if mark else both} {large.unit}".rstrip()
     return f"{shown} {large.unit} ± {spread} {small.unit}"
 
 
