@@ -11,7 +11,11 @@ from scipy.ndimage import binary_erosion
 from ..budget.reference_noise import reference_noise
 from ..errors import FracAccelError, IdentificationError
 from ..identification.checks.record_checks import moving_samples
-from ..identification.response.excitation import learning_length, require_excitation
+from ..identification.response.excitation import (
+    learning_length,
+    require_excitation,
+    strongest_stretch,
+)
 from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC
 from ..model import AXES, SensorModel
 from ..model.core import Gain, Oscillator
@@ -27,6 +31,7 @@ from .judgement import judge
 from .leftover import related
 from .spikes import spikes
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
+from .stretches import MOST
 from .time_limit import TimeLimit
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
@@ -107,7 +112,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     found.words.extend(notes)
     used = record.valid & moving
     noise = reference_noise(record, column, used, _stated_noise(source[0], column))
-    if noise:
+    if noise and noise.bends:
         found = dataclasses.replace(found, reference_noise=noise, words=[*found.words, noise.words])
     shown = _shown(found, record.sensor[:, column])
     stray = used & spikes(record.sensor[:, column], record.reference[:, column])
@@ -142,6 +147,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
+    engine.reference_noise = noise
     engine.aside = stray | (record.valid & ~moving)
     _require_relation(engine, axis, seed)
     best = engine.run(seed)
@@ -168,8 +174,10 @@ def _without_spikes(engine, used, stray, reference):
     """Engine whose fits leave out what stands out of the residual, too; and all that they do."""
     first = engine(used=used)
     # where samples do not count the residual is 0, and steps at their edges are no spikes
-    inside = binary_erosion(first.problem.used, iterations=_EDGE)
-    more = inside & spikes(first.search.fit(first.search.base).residual, reference)
+    p = first.problem
+    inside = binary_erosion(p.used, iterations=_EDGE)
+    more = p.put_back(inside & spikes(first.search.fit(first.search.base).residual,
+                                      p.taken(reference)), np.zeros(len(used), bool))
     return (engine(used=used & ~more) if more.any() else first), stray | more
 
 
@@ -184,6 +192,10 @@ def _classical(record, axis, used, limit):
     """Classical core (a gain where no resonance shows) identified from the record, what it knows
     of it (nothing, since any cause has bent it), and the effects that it was identified with."""
     from ..identification import identify
+    if len(record) > MOST:
+        # all that is found here is fitted anew
+        rows = strongest_stretch(record.reference[:, AXES.index(axis)], MOST)
+        record, used = record.part(rows), used[rows]
     model = identify(dataclasses.replace(record, valid=used), axis, "classical").model
     stds = dict.fromkeys(_CORE, np.inf)
     core, seed = SensorModel(model.core), {effect.cause: effect for effect in model.effects}

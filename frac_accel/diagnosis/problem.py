@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ..errors import FracAccelError
+from ..identification.response.excitation import strongest_stretch
 from ..model import AXES, AxisModel, is_link
 from ..model.core.oscillator import tail_rates
 from ..model.effects.base import CORE, CROSS_AXIS, GAIN, Effect
@@ -329,6 +330,47 @@ class Problem:
         masked = values * (self.used if values.ndim == 1 else self.used[:, None])
         return masked - free @ (free.T @ masked)
 
+    def taken(self, values):
+        """Values of the record as they are simulated: all of them."""
+        return values
+
+    def put_back(self, values, whole):
+        """A whole record's values with those that are simulated replaced: all of them."""
+        return values
+
+    def strongest(self, length):
+        """Slice of at most `length` samples where the motion is strongest."""
+        return strongest_stretch(self.record.reference[:, self.axis], length)
+
+    @property
+    def coherent(self):
+        """Slice without gaps in time: all."""
+        return slice(0, len(self.record))
+
+    def part(self, rows):
+        """Record of a slice."""
+        return self.record.part(rows)
+
+    def errors(self, fitted):
+        """Measured less simulated with a fit, everywhere in the record; NaN where not known."""
+        found = np.full(len(self.record), np.nan)
+        inside = slice(self.edge, len(found) - self.edge)
+        found[inside] = (self.measured - fitted.output)[inside]
+        return found
+
+    def dated(self, fit):
+        """Effects of a fit, with its instants where the whole record has them."""
+        return fit.effects
+
+    def response(self, axis):
+        """Output of one axis of the model in use, before its effects on the samples, shape (n,)."""
+        return self.simulator(axis).respond(self.baseline.axis(axis))
+
+    def mirrored(self):
+        """The same problem with the reference turned round."""
+        return Problem(dataclasses.replace(self.record, reference=-self.record.reference),
+                       self.axis, self.baseline, self.used, self.limit)
+
     def restricted(self, used):
         """The same problem with fewer samples that count."""
         part = object.__new__(type(self))
@@ -571,8 +613,7 @@ class Problem:
         """
         moving = [axis for axis in range(3) if np.ptp(self.record.reference[:, axis])]
         shares, stds = np.full((2, 3, 3), np.nan)
-        columns = [self.simulator(axis).respond(self.baseline.axis(axis))[self.used]
-                   for axis in moving]
+        columns = [self.response(axis)[self.used] for axis in moving]
         basis = np.stack([*columns, np.ones(self.count)], axis=1)
         inverse = np.linalg.pinv(basis.T @ basis)
         for axis in range(3):

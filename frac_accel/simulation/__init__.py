@@ -263,7 +263,7 @@ class AxisSimulator:
             start = force.equilibrium(load) - load
             deviation = kept(self._deviations, (known_by, force), nonlinear_motion.deviation,
                              modes, force, natural / (self._rate * steps), motion, start,
-                             natural * self._start_time_s)
+                             natural * self._start_time_s, most=3)
         if not np.isfinite(deviation[-1]):
             raise FracAccelError("the model's motion grows without bound: its nonlinear terms are "
                                  "too large for this record")

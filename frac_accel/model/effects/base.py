@@ -213,6 +213,10 @@ class Effect:
         return isinstance(core, Oscillator) or (
             cls.change_core is Effect.change_core and cls.add_force is Effect.add_force)
 
+    def degenerate(self):
+        """Why, with these parameters, it is not what its name says, in words; or None."""
+        return None
+
     def pure_delay_s(self):
         """Time [s] by which this effect moves the signal as it is."""
         return 0.0

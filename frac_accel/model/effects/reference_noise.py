@@ -39,7 +39,8 @@ class ReferenceNoise(Effect):
     @classmethod
     def of_record(cls, found, measured):
         noise = found.reference_noise
-        return noise and cls(noise.std, noise.frequency_hz, noise.share)
+        return cls(noise.std, noise.frequency_hz, noise.share) \
+            if noise and noise.bends else None
 
     def reading(self, seen):
         """What it explains, a fit without it tells: here the error is what that with it leaves."""
