@@ -20,7 +20,8 @@ _NAME = re.compile(r"/?([A-Za-z_]\w*)(/[A-Za-z_]\w*)*/?")
 
 def add_arguments(parser):
     """Options of the verb."""
-    parser.add_argument("program", choices=_PROGRAMS)
+    # a list: completion takes a mapping for commands of their own
+    parser.add_argument("program", choices=list(_PROGRAMS))
     parser.add_argument("-o", "--output", required=True, metavar="FILE", help="layout to write")
     parser.add_argument("--namespace", default="", metavar="NS",
                         help="where the sensor's topics are (default: the root)")

@@ -73,9 +73,9 @@ class Corrector(FracAccelNode):
         self._services_opened = [self.create_service(Trigger, "~/reload_model", self._on_reload)]
         if names:
             self._services_opened += [
-                self.create_service(SetParametersAtomically, f"~/{verb}", callback)
-                for verb, callback in (("add_sensor", self._on_add),
-                                       ("remove_sensor", self._on_remove))]
+                self.create_service(SetParametersAtomically, name, callback)
+                for name, callback in (("~/add_sensor", self._on_add),
+                                       ("~/remove_sensor", self._on_remove))]
         self._load, self._cpu_s, self._load_s = 0.0, time.process_time(), time.monotonic()
         self._spread_reports()
         self.turns.append(self._take_turn)
