@@ -17,7 +17,6 @@ from ..errors import FracAccelError
 EXAMPLES = """
 frac_accel watch
 frac_accel watch front/imu rear/imu
-ROS_DOMAIN_ID=7 frac_accel watch
 """
 _BARS = "▁▂▃▄▅▆▇█"
 _COLOURS = ("green", "yellow", "red")

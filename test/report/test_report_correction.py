@@ -121,7 +121,8 @@ def test_long_signals_are_drawn_by_their_ends():
     assert np.isnan(low).any() and np.isnan(low).mean() < 0.03
 
 
-@pytest.mark.parametrize("low, high, dtick", [(0.1, 1.0, "D2"), (0.02, 20.0, "D2"), (1e-7, 1.0, 1)])
+@pytest.mark.parametrize("low, high, dtick", [
+    (0.1, 1.0, "D2"), (0.02, 20.0, "D2"), (1e-7, 1.0, 1), (2.5, 4.0, None)])
 def test_logarithmic_axes_label_whole_numbers(low, high, dtick):
     """With this format the labels of 2 and 5 are 0.2 and 0.5, not lone small digits."""
     frequency = np.geomspace(1.0, 100.0, 50)
@@ -130,14 +131,34 @@ def test_logarithmic_axes_label_whole_numbers(low, high, dtick):
     assert figure.layout.xaxis.dtick == "D2"
 
 
+def labels(path):
+    """Labels that a browser writes beside the y axes of a page."""
+    dom, console = browser.open_page(path)
+    assert not console
+    return re.findall(r'class="ytick"><text[^>]*>([^<]*)</text>', dom)
+
+
 def test_a_browser_writes_those_labels(tmp_path):
+    page = Page("Labels")
+    for low, high in ((0.1, 1.0), (2.5, 4.0)):
+        page.section("One").figure(figures.spectra(
+            np.geomspace(1.0, 100.0, 50), {"a": np.geomspace(low, high, 50)}))
+    page.write(tmp_path / "p.html")
+    found = labels(tmp_path / "p.html")
+    assert {"0.1", "0.2", "0.5", "1"} <= set(found)
+    assert sum(2.4 < float(label) < 4.2 for label in found) >= 3
+
+
+def test_what_is_zoomed_into_has_labels(tmp_path):
+    """Where no 1, 2 or 5 is in the range that somebody has chosen."""
     page = Page("Labels")
     page.section("One").figure(figures.spectra(
         np.geomspace(1.0, 100.0, 50), {"a": np.geomspace(0.1, 1.0, 50)}))
-    page.write(tmp_path / "p.html")
-    dom, _ = browser.open_page(tmp_path / "p.html")
-    labels = set(re.findall(r'class="ytick"><text[^>]*>([^<]*)</text>', dom))
-    assert {"0.1", "0.2", "0.5", "1"} <= labels
+    zoom = ("<script>setTimeout(() => Plotly.relayout('figure-1', "
+            "{'yaxis.range': [Math.log10(0.22), Math.log10(0.45)]}), 2000)</script></body>")
+    (tmp_path / "p.html").write_text(page.html().replace("</body>", zoom))
+    found = labels(tmp_path / "p.html")
+    assert len(found) >= 3 and all(0.2 < float(label) < 0.5 for label in found)
 
 
 def test_titles_of_axes_are_broken_where_a_phone_ends():
