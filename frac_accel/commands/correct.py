@@ -5,20 +5,15 @@ are. Samples that cannot be corrected (the filter's warm-up, bad stamps or value
 """
 
 import collections
-import dataclasses
 
 import numpy as np
 
-from ..correction.design import plateau
-from ..errors import BagError, FracAccelError
-from ..io.bag import CORRECTED_TOPIC, BagWriter, cdr, read_bag
+from ..errors import BagError
+from ..io.bag import CORRECTED_TOPIC, BagWriter, cdr
 from ..io.motion import MovedMotion
 from ..io.outputs import say
-from ..model import AXES, SensorModel
-from ..report.correction import BeforeAfter, correction_page, filter_words
-from ..report.quantity import percent
+from ..model import SensorModel
 from ..streaming import Corrector
-from ..validation import compare
 from ._common import (
     add_bag,
     add_filter,
@@ -30,7 +25,6 @@ from ._common import (
     filter_wishes,
     open_bag,
     progress,
-    provenance,
     require_report,
     write_json,
 )
@@ -103,44 +97,12 @@ def run(arguments):
     print(f"  filter delay {summary['filter_delay_s']:.4g} s; sensor's own delay "
           f"{summary['sensor_delay_s']:.4g} s, taken out of the stamps")
     if arguments.report:
-        _page(sink.kept(), reader, corrector, arguments).write(arguments.report)
+        # whoever wants no page need not wait for what draws it
+        from ._correct_page import page
+        page(sink.kept(), reader, corrector, arguments).write(arguments.report)
         say(f"{arguments.report}: written")
     write_json(arguments.json, {"output": str(arguments.output), "counters": counters,
                                 "filters": summary, "warnings": [*reader.warnings, *notes]})
-
-
-def _page(kept, reader, corrector, arguments):
-    """Page of before and after, with errors where the bag has a reference to compare with."""
-    raw, index, corrected = kept
-    design, summary = corrector.design, corrector.design.summary()
-    reference = read_bag(arguments.bag, [arguments.reference])[arguments.reference] \
-        if arguments.reference in reader.topics else None
-    words, seen = [f"{corrector.counters['given']} of {corrector.counters['samples']} samples "
-                   f"corrected at {summary['sampling_rate_hz']:.6g} Hz."], []
-    for column, axis in enumerate(AXES):
-        if not np.ptp(corrected.values[:, column]):
-            words.append(f"Axis {axis} does not move, and is not shown.")
-            continue
-        words.append(filter_words(axis, summary))
-        drawn = BeforeAfter(
-            axis, summary["sampling_rate_hz"], corrected.stamps_ns,
-            raw.values[index, column] / plateau(design.model.axis(axis), design.model.band_hz),
-            corrected.values[:, column], np.sqrt(corrected.variance[:, column]),
-            summary["axes"][axis]["band_hz"])
-        try:
-            if reference is not None:
-                found = compare(reference, raw, corrected, design, axis)
-                drawn = dataclasses.replace(
-                    drawn, stamps_ns=found.stamps_ns, before=found.before, after=found.after,
-                    std=found.std, reference=found.reference)
-                words.append(f"Axis {axis}: NRMSE {percent(found.scaled.total.nrmse)} before, "
-                             f"{percent(found.corrected.total.nrmse)} after correction.")
-        except FracAccelError as error:
-            words.append(f"Axis {axis} is shown without its reference: {error}.")
-        seen.append(drawn)
-    source = provenance(arguments.bag, f"frac_accel correct {arguments.bag} --model "
-                        f"{arguments.model} --sensor {arguments.sensor}")
-    return correction_page("Correction", seen, words, source, corrector.model)
 
 
 def _temperatures(reader, topic, model):
