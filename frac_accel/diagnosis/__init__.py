@@ -103,7 +103,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     column = AXES.index(axis)
     stages.enter("checking the data", CHECKED)
     record = Record.of(*source, axis, temperature)
-    record, source, turned = _in_axes_of_reference(record, source, axis, temperature)
+    record, source, turned = _in_axes_of_reference(record, source, axis, temperature, model)
     found = record.integrity(column)
     found.words.extend(turned)
     if len(record) < _FEWEST:
@@ -156,10 +156,15 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
                  noise_std)
 
 
-def _in_axes_of_reference(record, source, axis, temperature):
+def _in_axes_of_reference(record, source, axis, temperature, model):
     """The record of a sensor whose axis follows another one, turned; its topics, and words."""
     orientation = Orientation.of(record)
-    if orientation is None or not orientation.astray(axis):
+    if orientation is None:
+        return record, source, []
+    if model and orientation.opposes(axis, -1 if _inverts(model.axis(axis)) else 1):
+        return record, source, [f"the sensor's {axis} axis points the other way than the model "
+                                "says, or its polarity is reversed: a gain below zero says that"]
+    if not orientation.astray(axis):
         return record, source, []
     try:
         source = source[0], orientation.turn(source[1])
@@ -168,6 +173,11 @@ def _in_axes_of_reference(record, source, axis, temperature):
         return record, source, []  # the refusal says which axis it follows
     return turned, source, [f"the sensor lies turned: {orientation.words}; what follows holds for "
                             "its signal turned into the reference's axes"]
+
+
+def _inverts(own):
+    """Whether a model turns slow motion round."""
+    return own.core.sensitivity < 0 if isinstance(own.core, (Gain, Oscillator)) else False
 
 
 def _without_spikes(engine, used, stray, reference):

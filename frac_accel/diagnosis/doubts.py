@@ -40,8 +40,9 @@ def doubts_about(engine, best, gains, stds, left, noise):
     doubts |= left_open(engine, best, stds, gains)
     takes = {cause: float(np.sqrt(max(g.before**2 - g.after**2, 0.0)))
              for cause, g in gains.items()}
-    own = engine.by_reference(best)
-    for cause, rms in takes.items():
+    own, added = engine.by_reference(best), {cause: engine.added(best, cause) for cause in gains}
+    for cause in gains:
+        rms = min(takes[cause], engine.rms(added[cause]))
         if rms < AS_NOISE * own:
             doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) is no more than what the "
                                      f"reference's own noise makes ({own:.3g} RMS)")
@@ -58,7 +59,6 @@ def doubts_about(engine, best, gains, stds, left, noise):
     for cause, words in {**by_what_is_left(engine, best, takes, left),
                          **_acausal(engine, best, stds), **_of_the_model(engine, best)}.items():
         doubts.setdefault(cause, words)
-    added = {cause: engine.added(best, cause) for cause in gains}
     for pair in cancelling(added):
         for cause, other in (pair, pair[::-1]):
             doubts.setdefault(cause, f"it nearly cancels {other}: together they may stand for "

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel
+from ..model.effects import effect_of
 from .doubts import by_what_is_left, doubts_about, left_open
 from .empirical import fit_empirical_link
 from .empirical_map import fit_empirical_map
@@ -79,7 +80,9 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
                         gain_words(cause, g, margin, instead), g)
         if cause in doubts:
             suspects.append(_suspect({cause}, 0.0, doubts[cause]))
-        elif margin > _CLEAR:
+        elif margin > _CLEAR or (best.effects[cause].everyday and instead and not any(
+                effect_of(name).everyday for name in instead)):
+            # of two that say the same, what is common
             findings.append(entry)
         else:
             suspects.append(_suspect({cause, *instead}, margin, "another cause explains as much"))
@@ -212,8 +215,8 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
     strange = engine.structure(fitted)
     # beside a model that leaves nothing that stands out, what is only suspected is chance
     plain = not findings and not strange and engine.left(fitted).share == 0
-    verdict = verdict_of(findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
-                         fraction, accounted, strange or faulty)
+    verdict = verdict_of(findings, [] if plain else suspects, complete,
+                         0.0 if plain else left.share, fraction, accounted, strange or faulty)
     effects = {**fitted.effects, **{f.cause: f.effect for f in findings}}
     described, after = _described(engine, fitted, after, {part for _, part in strange}) \
         if verdict in _INCOMPLETE else ({}, after)

@@ -28,6 +28,8 @@ _SINGULAR = 1e-10
 # the cause adds, where measured) and for its derivatives (ten times that, which bends no fit).
 _STEPS = 4
 _STEPS_OF_SLOPES = 2
+# Times the largest measured value from which a simulated one counts as without a bound.
+_UNBOUND = 1e6
 # Logarithm of what is left of a decay where it ends.
 _GONE = -60.0
 # A gain of this share of one sample's error changes nothing that the data can tell.
@@ -138,9 +140,11 @@ class Fitted:
 
     @property
     def size(self):
-        """Number of parameters that were chosen: those fitted, and the orders and kinds tried."""
-        return len(self.unknowns) + sum(len(fixed_values(effect))
-                                        for effect in self.effects.values())
+        """Number of parameters that were chosen: those fitted, the orders and kinds tried, and the
+        constant and the drift that are free where a filter of the reference has lost them."""
+        return len(self.unknowns) + sum(
+            len(fixed_values(effect)) + 2 * bool(np.any(effect.poles() == 0))
+            for effect in self.effects.values())
 
     @functools.cached_property
     def jacobian(self):
@@ -480,8 +484,7 @@ class Problem:
     def point(self, effects, rough):
         """`Point` with these parameters; raises FracAccelError where the motion has no bound."""
         simulated = self.simulate(effects, steps=_STEPS_OF_SLOPES if rough else _STEPS)
-        if not np.isfinite(simulated).all():
-            raise FracAccelError("the motion has no bound")
+        self._require_bound(simulated)
         columns = self.free_columns(effects)
         free, back = _span(columns * self.used[:, None])
         error = (self.measured - simulated) * self.used
@@ -489,6 +492,12 @@ class Problem:
         residual = error - free @ components
         return Point(effects, simulated, columns, free, back @ components, residual,
                      float(residual @ residual))
+
+    def _require_bound(self, simulated):
+        """Refuse an output that is out of all proportion: one that only begins to grow beyond all
+        numbers would spoil every product."""
+        if not np.max(np.abs(simulated)) < _UNBOUND * max(np.max(np.abs(self.measured)), 1e-300):
+            raise FracAccelError("the motion has no bound")
 
     def cost(self, effects, rough=False):
         """Cost of these causes with the parameters that they have; infinite without a bound."""
@@ -529,6 +538,7 @@ class Problem:
                     else:
                         # with forces, what comes across stays as it is: a few per cent of a column
                         change = self.simulate(new, not forced, steps) - before
+                    self._require_bound(change)
                 except FracAccelError:
                     continue
                 free = self.free_columns(new)

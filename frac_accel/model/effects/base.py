@@ -240,6 +240,10 @@ class Effect:
         """`StaticForce` of the core's spring as this effect leaves it."""
         return force
 
+    def change_base(self, values, sampling_rate_hz):
+        """The base's acceleration, shape (n,), from what is recorded of it."""
+        return values
+
     def base_gain(self, time_s):
         """Gain of the base's acceleration before the core, at times [s] since the record's start.
 
