@@ -13,6 +13,7 @@ from ..record import Record
 from ..report.identification import identification_page
 from ..report.quantity import left_open_by, written
 from ._common import (
+    BAG_HELP,
     add_json,
     add_report,
     add_topics,
@@ -33,7 +34,7 @@ frac_accel identify bench.mcap --axis z --reference /shaker/imu --sensor /seat/i
 
 def add_arguments(parser):
     """Options of the verb."""
-    parser.add_argument("bags", metavar="BAG", nargs="+", help="bare .mcap file or rosbag2 folder")
+    parser.add_argument("bags", metavar="BAG", nargs="+", help=BAG_HELP)
     parser.add_argument("--structure", choices=STRUCTURES, default="auto",
                         help="form of the model; auto chooses on held-out data "
                              "(default: %(default)s)")

@@ -57,6 +57,8 @@ def run(arguments):
     except FracAccelError as error:
         raise type(error)(f"{arguments.bag}: {error}") from None
     print(table(result, arguments.axis))
+    for words in result.words:
+        print(f"data: {words}")
     if arguments.report:
         _page(result, model, arguments).write(arguments.report)
         say(f"{arguments.report}: written")
