@@ -21,7 +21,7 @@ def test_there_are_examples():
     assert sum(len(examples(page)) for page in readme_examples.PAGES) >= 15
 
 
-@pytest.mark.parametrize("page", filter(examples, readme_examples.PAGES), ids=lambda p: p.stem)
+@pytest.mark.parametrize("page", [*filter(examples, readme_examples.PAGES)], ids=lambda p: p.stem)
 def test_console_examples(page, tmp_path):
     for command, shown in examples(page):
         printed = readme_examples.run(command, tmp_path)
