@@ -1,5 +1,5 @@
 # make setup | demo | check | test | test-all | lint | types | bench | soak | blind | fuzz |
-#      browser | pins | clean
+#      docs | browser | pins | clean
 # Needs Python 3.10 to 3.13, git and make. PYTHON=python3.12 chooses the Python of .venv.
 
 # A ROS that is sourced, or another venv with ROS, must not leak into ours.
@@ -7,10 +7,11 @@ unexport PYTHONPATH LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DELETE_ON_ERROR:
-.PHONY: setup demo check test test-all test-others test-oldest lint types bench soak blind fuzz browser pins clean FORCE
+.PHONY: setup demo docs check test test-all test-others test-oldest lint types bench soak blind fuzz browser pins clean FORCE
 
 venv := .venv
 oldest := .venv-oldest
+docs := .venv-docs
 python := $(venv)/bin/python
 numerical := -m pytest -n 2
 # What an installer says is kept, and shown only where it fails.
@@ -28,6 +29,11 @@ setup: install/.done
 
 demo: setup
 	@$(python) -m frac_accel.demo --output-dir demo_output
+
+# -W: a link that leads nowhere is an error. Pictures are made anew where their causes are newer.
+docs: setup $(docs)/.done
+	OPENBLAS_NUM_THREADS=1 $(docs)/bin/python -m sphinx -q -W --keep-going -b html docs site
+	@echo site/index.html
 
 # BLAS threads would only fight with the other worker.
 check test test-all test-others test-oldest: export OPENBLAS_NUM_THREADS := 1
@@ -94,10 +100,11 @@ pins:
 	    pythons="$$pythons $$(sh tools/find_python.sh $$minor python3.$$minor)" || exit; done; \
 	set -- $$pythons; \
 	$$1 tools/pin_requirements.py requirements/venv.in $$1 $$2 $$3 $$4 && \
+	$$1 tools/pin_requirements.py requirements/docs.in $$1 $$2 $$3 $$4 && \
 	$$1 tools/pin_requirements.py requirements/oldest.in $$1 $$2 $$3
 
 clean:
-	rm -rf $(venv) $(oldest) build install log demo_output *.egg-info .pytest_cache .ruff_cache
+	rm -rf $(venv) $(oldest) $(docs) site docs/made build install log demo_output *.egg-info .pytest_cache .ruff_cache
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 # A venv is made anew when its pins change, so that an interrupted or outdated one is never used;
@@ -123,6 +130,14 @@ $(venv)/.done: requirements/venv.txt
 $(oldest)/.done: requirements/oldest.txt
 	found=$$($(find_oldest)) && rm -rf $(oldest) && "$$found" -m venv $(oldest)
 	$(oldest)/bin/python -m pip install -q --require-hashes --no-deps -r $<
+	touch $@
+
+# What .venv has, and its own packages before it: none of the suite's are exchanged for it.
+$(docs)/.done: requirements/docs.txt $(venv)/.done
+	rm -rf $(docs) && $(python) -m venv $(docs)
+	$(docs)/bin/python -m pip install -q --require-hashes --no-deps -r $<
+	$(python) -c 'import sysconfig; print(sysconfig.get_path("purelib"))' \
+	    > "$$($(docs)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/venv.pth"
 	touch $@
 
 $(venv)/.frac_accel: $(venv)/.done $(metadata)

@@ -9,7 +9,7 @@ from setuptools import find_packages, setup
 PACKAGE = "frac_accel"
 # colcon may run this through a link from elsewhere
 ROOT = Path(__file__).resolve().parent
-NODES = ("corrector", "player", "recorder", "virtual_sensor")
+NODES = ("corrector", "managed_corrector", "player", "recorder", "virtual_sensor")
 
 
 def shared(folder, pattern="*"):
@@ -72,6 +72,8 @@ setup(
         "formats": ["rosbags>=0.10", "pyarrow", "asammdf>=8"],  # what `convert` reads and writes
         "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],  # ROS from wheels
         "test": ["pytest", "pytest-timeout", "rosbags"],  # the fast part of the suite
+        "watch": ["rich"],  # the live table of `frac_accel watch`; rosdep key python3-rich
+        "completion": ["shtab>=1.9.2"],  # makes completion scripts of argparse, also for fish
     },
     entry_points={"console_scripts": scripts},
 )

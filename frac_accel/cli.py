@@ -1,10 +1,10 @@
 """The command ``frac_accel``: one verb per file of `frac_accel.commands`."""
 
-import argparse
 import contextlib
 import importlib
 import sys
 
+from .commands.parser import Parser, nearest
 from .commands.process import Stopped, stopping_cleanly, tolerant_output, write_details
 from .errors import FracAccelError
 from .io.outputs import together
@@ -22,9 +22,13 @@ VERBS = {
     "budget": "what is left, parted by kind, in seconds, without naming anything",
     "diagnose": "what a simulation gets wrong, the cause, the extension, the gain",
     "report": "the page of a diagnosis again, from its result file",
+    "watch": "live in the terminal: RMS, rate, latency and verdict of each sensor",
+    "layout": "a layout for Foxglove or PlotJuggler, with the corrected samples' band",
     "paper": "the seed paper's tables and figures again, and the audit of its claims",
     "bench": "speed, latency and memory, beside peers in the same run",
+    "completion": "a script that completes all this in bash, zsh or fish",
 }
+_MORE = "frac_accel VERB --help tells more of each, with examples."
 
 
 def main(arguments=None):
@@ -44,20 +48,30 @@ def main(arguments=None):
         is 0, no output was written.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
-    parser = argparse.ArgumentParser(
-        prog="frac_accel",
-        description="Simulate, identify, validate, correct and diagnose accelerometers.",
-        epilog="frac_accel VERB --help tells more of each.")
-    verbs = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
+    if not arguments:
+        print(_list())
+        return 0
+    if arguments[0] == "--version":
+        from . import __version__
+        print(f"frac_accel {__version__}")
+        return 0
+    verb = next((word for word in arguments if not word.startswith("-")), None)
+    if verb is not None and verb not in VERBS:
+        print(f"frac_accel: no command '{verb}'{nearest(verb, VERBS)}; frac_accel lists them",
+              file=sys.stderr)
+        return 2
     try:
-        modules = _add_verbs(verbs, arguments)
+        parser, parsers, module = _parser(verb, arguments)
     except ModuleNotFoundError as error:
         print(f"frac_accel: the Python library {error.name} is missing; install it with "
               f"pip install {error.name}", file=sys.stderr)
         return 2
-    chosen = parser.parse_args(arguments)
+    chosen, rest = parser.parse_known_args(arguments)
+    if verb is None or rest:
+        (parsers[verb] if verb else parser).error(f"unknown argument {' '.join(rest)}")
+    chosen.parser, chosen.parsers = parser, parsers.values()
     with tolerant_output():
-        return _run(chosen, modules[chosen.verb], arguments)
+        return _run(chosen, module, arguments)
 
 
 def _run(chosen, module, arguments):
@@ -89,18 +103,32 @@ def _run(chosen, module, arguments):
     return status
 
 
-def _add_verbs(verbs, arguments):
-    """Modules of the verbs that are asked for."""
-    modules = {}
-    for verb, summary in VERBS.items():
-        sub = verbs.add_parser(verb, help=summary)
+def _parser(verb, arguments):
+    """Parser of the command, those of its verbs by name, and the module of the one asked for."""
+    parser = Parser(
+        prog="frac_accel", epilog=_MORE,
+        description="Simulate, identify, validate, correct and diagnose accelerometers.")
+    parser.add_argument("--version", action="store_true", help="print the version")
+    verbs, parsers, module = parser.add_subparsers(dest="verb", metavar="VERB"), {}, None
+    for name, summary in VERBS.items():
+        parsers[name] = verbs.add_parser(name, help=summary)
         # a verb's libraries are loaded only if it, or its help, is asked for
-        if verb in arguments:
-            modules[verb] = importlib.import_module(f".commands.{verb}", __package__)
-            sub.description = modules[verb].__doc__
-            sub.formatter_class = argparse.RawDescriptionHelpFormatter
-            modules[verb].add_arguments(sub)
-    return modules
+        if verb in (name, "completion"):
+            loaded = importlib.import_module(f".commands.{name}", __package__)
+            module = loaded if name == verb else module
+            parsers[name].describe(loaded)
+    if module is None:
+        parser.given = arguments
+    else:
+        parsers[verb].given = arguments[arguments.index(verb) + 1:]
+    return parser, parsers, module
+
+
+def _list():
+    """The verbs with a line of each."""
+    width = max(map(len, VERBS))
+    return "\n".join([f"frac_accel {name:{width}}  {summary}" for name, summary in VERBS.items()]
+                     + [_MORE])
 
 
 if __name__ == "__main__":

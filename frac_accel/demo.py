@@ -24,7 +24,8 @@ from .model import AXES, SensorModel
 from .model.parameters import as_mapping
 from .record import Record
 from .report.identification import identification_page
-from .report.quantity import rounded
+from .report.quantity import written
+from .shown import above, plain_logarithms
 from .streaming import Corrector
 from .validation import compare
 
@@ -91,12 +92,11 @@ def parameters(result, truth):
         axis = truth.axis(AXIS)
         for part in (axis.core, *axis.effects):
             known.update(as_mapping(part))
-    lines = ["parameter                 identified  standard uncertainty"
-             + ("        true" if known else "")]
+    lines = ["parameter              identified ± standard uncertainty"]
     for name, entry in result.parameters.items():
-        value, std = rounded(entry["value"], entry["std"])
-        true = f"{known[name]:12g}" if name in known else ""
-        lines.append(f"  {name:21} {value:>12}  {std:>20}{true}  {entry['unit']}".rstrip())
+        true = f"  true: {known[name]:g} {entry['unit']}" if name in known else ""
+        found = written(entry["value"], entry["std"], entry["unit"])
+        lines.append(f"  {name:21} {found:40}{true}".rstrip().removesuffix(" 1"))
     lines.append(f"residual {result.nrmse:.2%} of the output, {result.held_out_nrmse:.2%} on "
                  "held-out data")
     return "\n".join(lines + [f"note: {note}" for note in result.notes])
@@ -142,8 +142,9 @@ def picture(results, path):
         errors.semilogy(time_s, np.abs(result.after - result.reference)[first], color="#3f9bd8",
                         lw=0.8)
         errors.set_ylabel("|error| [m/s²]")
-    rows[0][0].legend(loc="upper right", ncols=3, fontsize="small")
-    rows[0][0].set_title(f"acceleration, first {_SHOWN_S} s")
+        plain_logarithms(errors)
+    above(rows[0][0])
+    rows[0][0].set_title(f"acceleration, first {_SHOWN_S} s", pad=20)
     rows[0][1].set_title("error before and after correction")
     for row in rows[-1]:
         row.set_xlabel("time [s]")

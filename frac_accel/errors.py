@@ -1,5 +1,7 @@
 """Errors that a user can act on: the commands print them as one line and exit with status 2."""
 
+import contextlib
+
 
 class FracAccelError(ValueError):
     """Bad input; the message says what is wrong and where."""
@@ -19,3 +21,20 @@ class DesignError(FracAccelError):
 
 class IdentificationError(FracAccelError):
     """Data from which the asked-for model cannot be identified; says what is missing."""
+
+
+@contextlib.contextmanager
+def naming(name):
+    """Errors from within begin with a name, such as one of several bags has, unless they have it.
+
+    Parameters
+    ----------
+    name : str
+        Empty: they stay as they are.
+    """
+    try:
+        yield
+    except FracAccelError as error:
+        if not name or name in str(error):
+            raise
+        raise type(error)(f"{name}: {error}") from None

@@ -26,3 +26,21 @@ class Shown:
         self.plot().savefig(image, format="png", dpi=90)
         data = base64.b64encode(image.getvalue()).decode()
         return f'<p>{html.escape(repr(self))}</p><img src="data:image/png;base64,{data}">'
+
+
+def above(axes: Any) -> None:
+    """Put the legend of a matplotlib Axes above it, where it hides no peak."""
+    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=4, frameon=False, fontsize="small",
+                borderaxespad=0.2)
+
+
+def plain_logarithms(axes: Any) -> None:
+    """Label logarithmic axes with 0.1, 0.2, 0.5, 1, or with powers of ten where these are many."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+    for axis in (axes.xaxis, axes.yaxis):
+        if axis.get_scale() != "log":
+            continue
+        low, high = axis.get_view_interval()
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 2000 * low else (1,)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())

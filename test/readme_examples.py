@@ -1,4 +1,4 @@
-"""What README.md shows: found, run, and written anew by ``python test/readme_examples.py``."""
+"""What the pages show: found, run, and written anew by ``python test/readme_examples.py``."""
 
 import re
 import subprocess
@@ -10,14 +10,17 @@ import real_records
 
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"
+# Pages whose examples are run.
+PAGES = (README, ROOT / "docs" / "tutorial.md", *sorted((ROOT / "docs" / "how_to").glob("*.md")))
+RECORDS_PAGE = ROOT / "docs" / "real_records.md"
 CONSOLE = re.compile(r"```console\n(.*?)```", re.DOTALL)
 RECORDS = re.compile(r"(<!-- real records -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 
-def blocks(language):
+def blocks(language, page):
     """Fenced blocks of one language, in the order of the page."""
-    text = README.read_text(encoding="utf-8")
+    text = page.read_text(encoding="utf-8")
     return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
 
 
@@ -51,16 +54,23 @@ def same(shown, printed, tolerance=0.03):
                for a, b in zip(NUMBER.findall(shown), NUMBER.findall(printed)))
 
 
-def main():
-    """Write the page's outputs as they are today."""
+def renew(page):
+    """Write a page's outputs as they are today."""
     with tempfile.TemporaryDirectory() as folder:
-        def renew(match):
+        def again(match):
             pairs = [(command, run(command, folder)) for command, _ in commands(match.group(1))]
             return "```console\n" + "".join(f"$ {c}\n{out}" for c, out in pairs) + "```"
-        text = CONSOLE.sub(renew, README.read_text(encoding="utf-8"))
-    if real_records.FOLDER.is_dir():
-        text = RECORDS.sub(lambda match: match[1] + real_records.table() + match[3], text)
-    README.write_text(text, encoding="utf-8")
+        page.write_text(CONSOLE.sub(again, page.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+def main():
+    """Write all of them, or those that are named, and the table of the real records."""
+    for page in map(Path, sys.argv[1:] or PAGES):
+        renew(page)
+    if real_records.FOLDER.is_dir() and not sys.argv[1:]:
+        text = RECORDS.sub(lambda match: match[1] + real_records.table() + match[3],
+                           RECORDS_PAGE.read_text(encoding="utf-8"))
+        RECORDS_PAGE.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

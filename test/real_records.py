@@ -1,4 +1,4 @@
-"""Identification and correction of the real records, as README.md shows them."""
+"""Identification and correction of the real records, as docs/real_records.md shows them."""
 
 from pathlib import Path
 

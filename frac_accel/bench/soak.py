@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 
+from ..shown import above
 from . import live, machine
 
 # The first part of the run fills windows and queues, and is no growth.
@@ -108,11 +109,11 @@ def _draw(path, result, memory_mb, latencies_ms):
     left, right = figure.subplots(1, 2)
     edges = np.geomspace(max(latencies_ms.min(), 1e-2), latencies_ms.max(), 120)
     left.hist(latencies_ms, edges, color="#35618f")
-    left.set(xscale="log", yscale="log", xlabel="latency [ms]", ylabel="messages",
-             title=f"{result['sent']:,} sent, {result['lost']} lost")
+    left.set(xscale="log", yscale="log", xlabel="latency [ms]", ylabel="messages")
+    left.set_title(f"{result['sent']:,} sent, {result['lost']} lost", pad=20)
     for name, style in (("p50", "--"), ("p99", ":")):
         left.axvline(result[f"latency_{name}_ms"], color="black", linestyle=style, label=name)
-    left.legend()
+    above(left)
     right.plot(np.arange(len(memory_mb)) / len(memory_mb) * result["minutes"], memory_mb,
                color="#35618f")
     right.set(xlabel="time [min]", ylabel="resident memory [MB]", ylim=(0, 1.2 * max(memory_mb)),

@@ -1,6 +1,7 @@
 """What the verbs share: options, results as files, progress."""
 
 import argparse
+import contextlib
 import hashlib
 import json
 import math
@@ -154,14 +155,22 @@ def require_report(path):
 
 
 def progress(total, unit="msg"):
-    """Bar on standard error that shows after two seconds."""
-    return tqdm(total=total, unit=unit, delay=2, leave=False, file=sys.stderr, unit_scale=True)
+    """Bar on standard error, where that is a terminal, that shows after two seconds."""
+    return tqdm(total=total, unit=unit, delay=2, leave=False, file=sys.stderr, unit_scale=True,
+                disable=None)
 
 
-def step(bar, words):
-    """Show what is being done, if it has been two seconds."""
-    bar.set_description(words, refresh=False)
-    bar.update()
+@contextlib.contextmanager
+def share_done():
+    """The same of work whose share that is done is known: a function of words and that share."""
+    # the pace since the start tells the time left, as the last step alone would not
+    with tqdm(total=100, delay=2, leave=False, file=sys.stderr, disable=None, smoothing=0,
+              bar_format="{desc}: {percentage:.0f} % done{bar:20} {elapsed}, about {remaining} left"
+              ) as bar:
+        def show(words, share):
+            bar.set_description_str(words, refresh=False)
+            bar.update(max(0, round(100 * share) - bar.n))
+        yield show
 
 
 def printable(name):

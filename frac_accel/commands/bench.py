@@ -11,7 +11,7 @@ import platform
 import sys
 
 from ..errors import FracAccelError
-from ._common import add_json, progress, step, write_json
+from ._common import add_json, progress, write_json
 
 SUITES = {
     "kernel": "the correction in one process",
@@ -20,6 +20,11 @@ SUITES = {
     "live": "the corrector over DDS, beside relays; needs rclpy",
     "sensors": "a vehicle's rates, and many sensors in one process; needs rclpy",
 }
+
+EXAMPLES = """
+frac_accel bench
+frac_accel bench kernel bag --json bench.json
+"""
 
 
 def add_arguments(parser):
@@ -57,7 +62,7 @@ def run(arguments):
             bar.set_description(name, refresh=False)
             figures += importlib.import_module(f"frac_accel.bench.{name}").run(
                 arguments.rounds)
-            step(bar, name)
+            bar.update()
     machine = {"cores": os.cpu_count(), "load_average_before": before,
                "load_average_after": os.getloadavg(), "python": platform.python_version(),
                "machine": platform.machine(), **_versions()}

@@ -17,6 +17,11 @@ from ._common import (
     write_json,
 )
 
+EXAMPLES = """
+frac_accel budget drive.mcap
+frac_accel budget drive.mcap --model sensor.yaml --json budget.json
+"""
+
 
 def add_arguments(parser):
     """Options of the verb."""

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import BagError
 from ..io.bag import CORRECTED_TOPIC, BagWriter, cdr
 from ..io.motion import MovedMotion
+from ..io.outputs import say
 from ..model import SensorModel
 from ..streaming import Corrector
 from ._common import (
@@ -18,13 +19,20 @@ from ._common import (
     add_filter,
     add_json,
     add_model,
+    add_report,
     add_temperature,
     add_topics,
     filter_wishes,
     open_bag,
     progress,
+    require_report,
     write_json,
 )
+
+EXAMPLES = """
+frac_accel correct drive.mcap --model sensor.yaml -o corrected.mcap
+frac_accel correct drive.mcap --model sensor.yaml -o corrected.mcap --bandwidth 80 --max-delay 0.02
+"""
 
 
 def add_arguments(parser):
@@ -37,11 +45,13 @@ def add_arguments(parser):
     parser.add_argument("--corrected", default=CORRECTED_TOPIC, metavar="TOPIC",
                         help="topic of the corrected samples (default: %(default)s)")
     add_filter(parser)
+    add_report(parser)
     add_json(parser)
 
 
 def run(arguments):
     """Do it."""
+    require_report(arguments.report)
     corrector = Corrector(SensorModel.load(arguments.model), **filter_wishes(arguments))
     reader = open_bag(arguments.bag)
     raw = reader.topic(arguments.sensor, cdr.ACCELERATION_TYPES)
@@ -54,7 +64,8 @@ def run(arguments):
         for name in copied:
             writer.copy_topic(reader.topics[name])
         writer.copy_topic(raw, arguments.corrected)
-        sink = _Sink(corrector, writer, raw.type_name, arguments.corrected, temperatures)
+        sink = _Sink(corrector, writer, raw.type_name, arguments.corrected, temperatures,
+                     bool(arguments.report))
         for block in reader.blocks(copied):
             messages = block.messages
             writer.write_many(block.topic.name, list(zip(
@@ -85,6 +96,11 @@ def run(arguments):
               "Hz".format(corrector.design.extrapolated_below_hz, *corrector.model.band_hz))
     print(f"  filter delay {summary['filter_delay_s']:.4g} s; sensor's own delay "
           f"{summary['sensor_delay_s']:.4g} s, taken out of the stamps")
+    if arguments.report:
+        # whoever wants no page need not wait for what draws it
+        from ._correct_page import page
+        page(sink.kept(), reader, corrector, arguments).write(arguments.report)
+        say(f"{arguments.report}: written")
     write_json(arguments.json, {"output": str(arguments.output), "counters": counters,
                                 "filters": summary, "warnings": [*reader.warnings, *notes]})
 
@@ -117,7 +133,8 @@ def fates(counters):
 class _Sink:
     """Runs raw blocks through the corrector and writes what becomes ready."""
 
-    def __init__(self, corrector, writer, type_name, topic, temperatures):
+    def __init__(self, corrector, writer, type_name, topic, temperatures, keeps=False):
+        self._keeps, self._raw, self._ready = keeps, [], []
         self._corrector, self._writer = corrector, writer
         self._temperatures = collections.deque(temperatures)
         self._type, self._topic = type_name, topic
@@ -132,9 +149,11 @@ class _Sink:
                 samples = cdr.read_point_cloud(data)
                 self._frame, self._log = samples.frame_id, log
                 self._tell_temperature(log)
+                self._keep_raw(samples)
                 self._write_cloud(self._corrector.process(samples.stamps_ns, samples.values))
             return
         samples = block.samples()
+        self._keep_raw(samples)
         self._waiting.extend(zip(messages, block.log_times_ns.tolist()))
         logs, start = block.log_times_ns, 0
         while start < len(logs):
@@ -151,11 +170,28 @@ class _Sink:
         while self._temperatures and self._temperatures[0][0] <= log_time_ns:
             self._corrector.set_temperature(self._temperatures.popleft()[1])
 
+    def _keep_raw(self, samples):
+        if self._keeps:
+            self._raw.append(samples)
+
+    def _keep(self, ready):
+        if self._keeps and len(ready):
+            self._ready.append(ready)
+
+    def kept(self):
+        """Raw samples, which of them were corrected, and the corrected ones."""
+        index = np.concatenate([ready.index for ready in self._ready])
+        corrected = cdr.Samples.of(*(np.concatenate([getattr(ready, name) for ready in
+                                                     self._ready])
+                                     for name in ("stamps_ns", "values", "variance")))
+        return cdr.Samples.concatenate(self._raw), index, corrected
+
     def finish(self):
         rest = self._corrector.finish()
         (self._write_cloud if self._type == cdr.POINT_CLOUD2 else self._write)(rest)
 
     def _write(self, ready):
+        self._keep(ready)
         if not len(ready):
             return
         # a sample that was never given out is dropped when a later one is
@@ -169,6 +205,7 @@ class _Sink:
         self._writer.write_many(self._topic, list(zip(patched, logs, logs)))
 
     def _write_cloud(self, ready):
+        self._keep(ready)
         if len(ready):
             block = cdr.Samples.of(ready.stamps_ns, ready.values, np.full(ready.values.shape,
                                                                           np.nan), self._frame)

@@ -6,6 +6,7 @@ from ..diagnosis import diagnose
 from ..io.bag import TEMPERATURE_TOPIC, read_temperature
 from ..io.outputs import say
 from ..model import SensorModel
+from ..report.quantity import written
 from ._common import (
     add_bag,
     add_json,
@@ -13,15 +14,19 @@ from ._common import (
     add_topics,
     open_bag,
     positive,
-    progress,
     provenance,
     require_report,
-    step,
+    share_done,
     write_json,
 )
 
 # Share of what is left from which a part of the error budget is told.
 _SHOWN = 0.01
+
+EXAMPLES = """
+frac_accel diagnose drive.mcap --model sensor.yaml --report found.html
+frac_accel diagnose drive.mcap --model sensor.yaml --extended-model better.yaml --json found.json
+"""
 
 
 def add_arguments(parser):
@@ -56,9 +61,9 @@ def run(arguments):
     elif arguments.temperature != TEMPERATURE_TOPIC:
         print(f"warning: {arguments.bag}: no topic {arguments.temperature}: what depends on "
               "temperature cannot be found", file=sys.stderr)
-    with progress(None, unit="step") as bar:
+    with share_done() as show:
         found = diagnose(arguments.bag, model, arguments.axis, temperature, arguments.reference,
-                         arguments.sensor, lambda words: step(bar, words),
+                         arguments.sensor, show,
                          arguments.noise_std, arguments.time_limit)
     print(table(found, arguments.axis))
     command = f"frac_accel diagnose {arguments.bag} --axis {arguments.axis}" + (
@@ -92,9 +97,7 @@ def table(found, axis):
     for finding in found.findings:
         lines.append(f"{finding.cause}: {finding.effect.explanation}")
         for name, entry in finding.as_dict()["parameters"].items():
-            value, std = entry["value"], entry["std"]
-            lines.append(f"  {name:21} {value:>12}" if not entry["unit"] else
-                         f"  {name:21} {value:12.6g} +- {std:.2g} {entry['unit']}")
+            lines.append(f"  {name:21} {written(entry['value'], entry['std'], entry['unit'])}")
         lines += [f"  {words}" for words in finding.evidence]
     for suspect in found.suspects:
         lines += [f"suspected: {' or '.join(suspect['causes'])}: {suspect['reason']}",

@@ -6,11 +6,12 @@ mean, and whether they agree is said.
 
 from pathlib import Path
 
+from ..errors import naming
 from ..identification import STRUCTURES, identify
 from ..io.outputs import say
 from ..record import Record
 from ..report.identification import identification_page
-from ..report.quantity import left_open_by
+from ..report.quantity import left_open_by, written
 from ._common import (
     BAG_HELP,
     add_json,
@@ -18,12 +19,17 @@ from ._common import (
     add_topics,
     open_bag,
     printable,
-    progress,
     provenance,
     require_report,
-    step,
+    share_done,
     write_json,
 )
+
+EXAMPLES = """
+frac_accel identify bench.mcap -o sensor.yaml
+frac_accel identify monday.mcap tuesday.mcap -o sensor.yaml --report sensor.html
+frac_accel identify bench.mcap --axis z --reference /shaker/imu --sensor /seat/imu -o seat.yaml
+"""
 
 
 def add_arguments(parser):
@@ -44,16 +50,17 @@ def run(arguments):
     require_report(arguments.report)
     for bag in bags:
         open_bag(bag)
-    pairs = [Record.load(bag, arguments.reference, arguments.sensor, arguments.axis)
-             for bag in bags]
+    pairs = []
+    for bag in bags:
+        with naming(bag):
+            pairs.append(Record.load(bag, arguments.reference, arguments.sensor, arguments.axis))
     command = (f"frac_accel identify {' '.join(bags)} --structure {arguments.structure} "
                f"--reference {arguments.reference} --sensor {arguments.sensor} "
                f"--axis {arguments.axis}")
     source = _provenance(bags, command)
-    with progress(None, unit="step") as bar:
-        result = identify(pairs, arguments.axis, arguments.structure, source,
-                          lambda words: step(bar, words),
-                          [printable(Path(bag).name) for bag in bags])
+    with share_done() as show:
+        result = identify(pairs, arguments.axis, arguments.structure, source, show,
+                          [printable(bag) for bag in _told_apart(bags)])
     result.model.save(arguments.output)
     _print(result, pairs, bags)
     say(f"{arguments.output}: written")
@@ -63,6 +70,12 @@ def run(arguments):
         source = page.provenance
         say(f"{arguments.report}: written")
     write_json(arguments.json, {**result.as_dict(), "provenance": source})
+
+
+def _told_apart(bags):
+    """Names of the bags, with their folders where two are alike."""
+    names = [Path(bag).name for bag in bags]
+    return names if len(set(names)) == len(names) else bags
 
 
 def _print(result, pairs, bags):
@@ -76,7 +89,7 @@ def _print(result, pairs, bags):
     left_open = left_open_by(result.parameters, result.model.core)
     for name, entry in result.parameters.items():
         words = "open: these data do not determine it" if name in left_open \
-            else f"{entry['value']:12.6g} +- {entry['std']:.2g} {entry['unit']}"
+            else written(entry["value"], entry["std"], entry["unit"])
         print(f"  {name:21} {words}")
     print(f"  residual {result.nrmse:.3%} of the output, {result.held_out_nrmse:.3%} on held-out "
           "data")

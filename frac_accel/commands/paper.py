@@ -7,11 +7,16 @@ from ..paper import BAGS, PaperResult, reproduce
 from ._common import (
     add_json,
     add_report,
-    progress,
     provenance,
     require_report,
+    share_done,
     write_json,
 )
+
+EXAMPLES = """
+frac_accel paper --quick
+frac_accel paper --report paper.html
+"""
 
 
 def add_arguments(parser):
@@ -28,10 +33,7 @@ def add_arguments(parser):
 def run(arguments):
     """Do it."""
     require_report(arguments.report)
-    with progress(100, unit="%") as bar:
-        def show(words, share):
-            bar.set_description(words, refresh=False)
-            bar.update(max(0, round(100 * share) - bar.n))
+    with share_done() as show:
         result = reproduce(not arguments.quick, arguments.bags, show)
     print(table(result))
     if arguments.report:

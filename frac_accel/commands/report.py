@@ -16,6 +16,10 @@ _LARGEST = 64 * 2**20
 _NOT_A_RESULT = LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError
 """What drawing a page of anything else ends in."""
 
+EXAMPLES = """
+frac_accel report found.json -o found.html
+"""
+
 
 def add_arguments(parser):
     """Options of the verb."""

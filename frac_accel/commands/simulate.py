@@ -22,6 +22,11 @@ from ._common import (
     write_json,
 )
 
+EXAMPLES = """
+frac_accel simulate drive.mcap --model sensor.yaml -o simulated.mcap
+frac_accel simulate drive.mcap --model sensor.yaml -o simulated.mcap --initial steady
+"""
+
 
 def add_arguments(parser):
     """Options of the verb."""

@@ -2,22 +2,33 @@
 
 from ..errors import FracAccelError
 from ..io.bag import read_bag
+from ..io.outputs import say
 from ..model import SensorModel
+from ..report.correction import BeforeAfter, correction_page, filter_words
+from ..report.quantity import percent
 from ..validation import validate
 from ._common import (
     add_bag,
     add_filter,
     add_json,
     add_model,
+    add_report,
     add_temperature,
     add_topics,
     filter_wishes,
     open_bag,
+    provenance,
     read_temperature_at,
+    require_report,
     write_json,
 )
 
 _HEADING = "           band [Hz]   NRMSE [%]  amplitude [%]  phase [deg]   peak [%]"
+
+EXAMPLES = """
+frac_accel validate other_day.mcap --model sensor.yaml
+frac_accel validate other_day.mcap --model sensor.yaml --axis z --report validated.html
+"""
 
 
 def add_arguments(parser):
@@ -27,11 +38,13 @@ def add_arguments(parser):
     add_topics(parser)
     add_temperature(parser)
     add_filter(parser)
+    add_report(parser)
     add_json(parser)
 
 
 def run(arguments):
     """Do it."""
+    require_report(arguments.report)
     model = SensorModel.load(arguments.model)
     reader = open_bag(arguments.bag)
     temperature = None
@@ -46,7 +59,28 @@ def run(arguments):
     print(table(result, arguments.axis))
     for words in result.words:
         print(f"data: {words}")
+    if arguments.report:
+        _page(result, model, arguments).write(arguments.report)
+        say(f"{arguments.report}: written")
     write_json(arguments.json, result.as_dict())
+
+
+def _page(result, model, arguments):
+    axis, seen, filters = arguments.axis, result.comparison, result.filters
+    drawn = BeforeAfter(axis, filters["sampling_rate_hz"], seen.stamps_ns, seen.before, seen.after,
+                        seen.std, filters["axes"][axis]["band_hz"], seen.reference)
+    summary = [f"NRMSE {percent(seen.scaled.total.nrmse)} before and "
+               f"{percent(seen.corrected.total.nrmse)} after correction; the simulated output "
+               f"differs from the measured one by {percent(result.simulation.total.nrmse)}.",
+               filter_words(axis, filters)]
+    source = provenance(arguments.bag, f"frac_accel validate {arguments.bag} --model "
+                        f"{arguments.model} --reference {arguments.reference} --sensor "
+                        f"{arguments.sensor} --axis {axis}")
+    return correction_page(
+        f"Validation, axis {axis}", [drawn], summary, source, model,
+        {"simulated against measured output": result.simulation,
+         "raw / sensitivity against reference": seen.scaled,
+         "corrected against reference": seen.corrected})
 
 
 def table(result, axis):

@@ -30,6 +30,7 @@ from .flat import flat_instead
 from .judgement import judge
 from .leftover import related
 from .spikes import spikes
+from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
 from .stretches import MOST
 from .time_limit import TimeLimit
 
@@ -67,7 +68,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     reference, sensor : str
         Topics, where `source` is a bag.
     progress : callable, optional
-        Called with a few words before each step.
+        Called in each step with a few words and the share that is about done.
     noise_std : float, optional
         Standard deviation of the sensor's noise [output units], where it is known.
     time_limit_s : float
@@ -96,11 +97,11 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     """
     if noise_std is not None and not (np.isfinite(noise_std) and noise_std > 0):
         raise FracAccelError(f"noise_std: {noise_std} given, expected a number above 0")
-    progress = progress or (lambda words: None)
     limit = TimeLimit(time_limit_s)
+    stages = Stages(progress, limit)
     source = pair_of(source, sampling_rate_hz, axis, reference, sensor)
     column = AXES.index(axis)
-    progress("checking the data")
+    stages.enter("checking the data", CHECKED)
     record = Record.of(*source, axis, temperature)
     record, source, turned = _in_axes_of_reference(record, source, axis, temperature, model)
     found = record.integrity(column)
@@ -125,7 +126,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
                                 found)
     seed = None
     if model is None:
-        progress("identifying a classical model")
+        stages.enter("identifying a classical model", IDENTIFIED)
         try:
             require_excitation(record.reference[:, column], record.sampling_rate_hz, _COEFFICIENTS)
         except IdentificationError as error:
@@ -141,7 +142,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
             **{cause: effect for cause, effect in shown.items() if effect.of_reference}},
         candidates=[cause for cause, effect in known_effects().items()
                     if not effect.read_off and effect.acts_on(model.axis(axis).core)],
-        log=progress, step=found.step, limit=limit)
+        stages=stages, step=found.step, limit=limit)
     engine, stray = _without_spikes(engine, used, stray, record.reference[:, column])
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
@@ -149,7 +150,9 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     engine.reference_noise = noise
     engine.aside = stray | (record.valid & ~moving)
     _require_relation(engine, axis, seed)
-    return judge(engine, engine.run(seed), found, shown, loose, source[1],
+    best = engine.run(seed)
+    stages.enter("judging what was found", JUDGED)
+    return judge(engine, best, found, shown, loose, source[1],
                  noise_std)
 
 

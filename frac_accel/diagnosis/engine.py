@@ -21,6 +21,7 @@ from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
 from .problem import Problem
 from .search import Search
+from .stages import COMPARED
 from .stretches import Stretches, stretches_of
 
 # Improvement, in variances of one sample's noise and for each parameter, that chance does not give.
@@ -79,8 +80,8 @@ class Engine:
     The measured values may have a lattice with a known `step`.
     """
 
-    def __init__(self, record, axis, baseline, used, base=None, candidates=(), log=None, step=None,
-                 limit=None):
+    def __init__(self, record, axis, baseline, used, base=None, candidates=(), stages=None,
+                 step=None, limit=None):
         slices = stretches_of(record, axis)
         self.problem = Stretches(record, axis, baseline, used, limit, slices) if slices[1:] else \
             Problem(record, axis, baseline, used, limit)
@@ -89,7 +90,7 @@ class Engine:
         self._step = step
         # the record, and its samples that may count: of a very long one, more than are fitted
         self.record, self.wanted = record, used
-        self.search = Search(self.problem, base, candidates, log)
+        self.search = Search(self.problem, base, candidates, stages)
         # of the reference, where it shows too little to bend a fit: `ReferenceNoise` or None
         self.reference_noise = None
         # what counts in no fit, since a signal was at fault there
@@ -128,7 +129,7 @@ class Engine:
             # where the motion is strongest is enough to find most causes, and to judge them
             rows = p.strongest(LONG // 2)
             self.part = Engine(p.part(rows), p.axis, p.baseline, p.taken(self.wanted)[rows],
-                               self.search.base, self.search.candidates, self.search.log,
+                               self.search.base, self.search.candidates, self.search.stages,
                                self._step, p.limit)
             return self.part.run(seed)
         self.best = self.compete(self.search.run(self.threshold, self.promises, self.noise_only,
@@ -161,6 +162,7 @@ class Engine:
         for _ in range(4):
             unexplained = self.unexplained(best)
             for cause in best.effects:
+                self.search.stages.enter_round(f"comparing {cause} with its rivals", COMPARED)
                 # nothing takes the place of one that is too weak to be named
                 if cause in self.search.base or \
                         self.rms(self.added(best, cause)) < WEIGHS * unexplained:

@@ -8,6 +8,7 @@ from scipy.signal import welch
 from ..identification.response.excitation import strongest_stretch
 from ..model import AXES, SensorModel
 from ..model.parameters import plain
+from ..shown import above
 from ..signals.thinning import close_up, legible, segment, thinned
 from .engine import noise_peak
 from .leftover import Leftover
@@ -140,7 +141,7 @@ class Evidence:
             for name, (time, values) in by_name.items():
                 axes.plot(time, values, label=name, linewidth=0.8)
             axes.set_ylabel(f"{kind} [output units]")
-            axes.legend(loc="upper right")
+            above(axes)
         axes.set_xlabel("time [s]")
 
     def as_dict(self):

@@ -8,6 +8,7 @@ from ..errors import FracAccelError
 from ..model.effects import IDENTIFIED, known_effects
 from ..model.parameters import fixed_values
 from .problem import acts_on_spring
+from .stages import SEARCHED, Stages
 
 _BEAM = 3
 # A start that fits so much worse than the set without its cause has its strength halved, at most so
@@ -59,12 +60,12 @@ class View:
 class Search:
     """Fits sets of causes, each once."""
 
-    def __init__(self, problem, base=None, candidates=(), log=None):
+    def __init__(self, problem, base=None, candidates=(), stages=None):
         self.problem, self.base = problem, base or {}
         self.candidates = candidates
         self.fits = {}
         self.screens, self._starts = {}, {}
-        self.log = log or (lambda words: None)
+        self.stages = stages or Stages(None, problem.limit)
 
     def fit(self, effects):
         """Fitted set of causes, from the parameters given unless it is known."""
@@ -91,7 +92,6 @@ class Search:
         most = min(_AT_HAND, max(_AT_HAND * _AT_HAND_SAMPLES // len(self.problem.record), 2))
         for older in list(self.fits.values())[-2 * _AT_HAND:-most]:
             older.let_go()
-        self.log(f"fit {sorted(fit.causes - set(self.base))}: {fit.cost:.6g}")
 
     def fit_all(self, sets, best=np.inf, goal=np.inf):
         """Fitted sets by cost; none of those that fall far behind (a cost) is fitted to the end.
@@ -184,7 +184,8 @@ class Search:
         view, found = self.view(fitted), []
         rows, share = self._screened_rows()
         known = _orthonormal(np.hstack([fitted.free[rows], fitted.jacobian[rows]]))
-        for cause in self.candidates:
+        for place, cause in enumerate(self.candidates):
+            self.stages.within(place / len(self.candidates))
             if cause in fitted.effects:
                 continue
             if self.problem.limit.ends_search("some causes were not screened"):
@@ -281,6 +282,7 @@ class Search:
             Causes to begin with, besides none.
         """
         bare = self.fit(self.base)
+        self.stages.enter_round("looking at all causes", SEARCHED)
         seeds = [{}, seed or {}]
         if not done(bare):
             seeds.append(self._everyday(bare))
@@ -295,6 +297,7 @@ class Search:
         for added in range(most):
             if self.problem.limit.ends_search(f"no cause was added to {len(best.causes)}"):
                 break
+            self.stages.enter_round(f"searching for cause {added + 1}", SEARCHED)
             wanted = {}
             least = best.cost - threshold(best) if done(best) else np.inf
             for parent in beam:

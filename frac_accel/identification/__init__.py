@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FracAccelError, IdentificationError, ModelError
+from ..errors import FracAccelError, IdentificationError, ModelError, naming
 from ..io.samples import Samples
 from ..model import SensorModel
 from ..record import Record
@@ -55,7 +55,7 @@ def identify(pair: Any, axis: str = "x", structure: str = "auto",
     provenance : dict, optional
         Where the data come from; becomes part of the model.
     progress : callable, optional
-        Called with a few words before each step that may take seconds.
+        Called before each step that may take seconds, with a few words and the share that is done.
     records : list of str, optional
         Names of several pairs, for messages.
     sampling_rate_hz : float, optional
@@ -94,8 +94,11 @@ def identify(pair: Any, axis: str = "x", structure: str = "auto",
         raise IdentificationError("no record given, expected at least one")
     records = records or [Path(pair).name if isinstance(pair, (str, Path)) else f"record {i + 1}"
                           for i, pair in enumerate(pairs)]
-    progress = progress or (lambda words: None)
-    datas = [Data.of(_pair(pair, axis, sampling_rate_hz), axis, progress) for pair in pairs]
+    step = _counted(progress, structure, len(pairs))
+    datas = []
+    for name, pair in zip(records, pairs):
+        with naming(name if len(pairs) > 1 else ""):
+            datas.append(Data.of(_pair(pair, axis, sampling_rate_hz), axis, step))
     agreeing = None
     if len(datas) > 1:
         structure = {"classical": "oscillator"}.get(structure, structure)
@@ -118,6 +121,22 @@ def _require_loadable(model):
     except ModelError as error:
         raise IdentificationError(f"what fits best is no sensor: {error}; are the stamps right?") \
             from None
+
+
+def _counted(progress, structure, records):
+    """Tells `progress` of a step its share of all that there will be, as far as that is known."""
+    structures = 1
+    if structure == "auto":
+        structures = 4 if records == 1 else 2
+    expected = records * 2 + structures * (records + 1) + (records == 1)
+    done = 0
+
+    def step(words):
+        nonlocal done
+        if progress:
+            progress(words, min(done / expected, 1.0))
+        done += 1
+    return step
 
 
 def _is_pair(source):

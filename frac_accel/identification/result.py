@@ -9,7 +9,7 @@ from ..model import SensorModel
 from ..model.core import Oscillator
 from ..model.effects import IDENTIFIED, fault_of_reference, identified_effect
 from ..model.parameters import parameter_fields, plain, rebuilt, unit_of
-from ..shown import Shown
+from ..shown import Shown, above, plain_logarithms
 from .evidence import Evidence
 from .fit.arx import ArxFit
 from .fit.uncertainty import SIGNIFICANT
@@ -84,7 +84,9 @@ class Identification(Shown):
             measured = self.points.response
             upper.loglog(self.points.frequency_hz, np.abs(measured), ".", label="measured")
             lower.semilogx(self.points.frequency_hz, np.degrees(np.angle(measured)), ".")
-        upper.legend()
+        above(upper)
+        for axes in (upper, lower):
+            plain_logarithms(axes)
         upper.set_ylabel("amplitude [output units per m/s²]")
         lower.set(xlabel="frequency [Hz]", ylabel="phase [°]")
 

@@ -109,6 +109,8 @@ class Channel:
             counters=counters, changes=changes, load=load, findings=self._findings,
             reference_silent_s=reference_silent_s, zero_stamps=self._zero_stamps,
             without_clock=self._node.is_without_clock))
+        if not self._node.is_active:
+            level, message = health.OK, "inactive: nothing is published until it is activated"
         self._is_well, self._zero_stamps = level == health.OK, False
         self._tell(level, message)
         figures = {"received_per_s": changes.get("samples", 0) / period_s,

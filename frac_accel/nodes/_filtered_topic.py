@@ -85,6 +85,8 @@ class FilteredTopic:
         Messages that came while there was no filter to be had.
     published, unpublished : int
         Outputs that the middleware has taken, and those that it has not.
+    withheld : int
+        Outputs that came while the node was not active.
     late : int
         Messages that waited for `LATE_S` longer than the node's latency budget.
     overflowed : int
@@ -100,7 +102,7 @@ class FilteredTopic:
                  on_processed=None, on_two_publishers="first"):
         self.messages = None
         self.failure = ""
-        self.unfiltered = self.published = self.unpublished = 0
+        self.unfiltered = self.published = self.unpublished = self.withheld = 0
         self.late = self.overflowed = self._deepest = 0
         self.last_message_s = self.last_published_s = None
         self.other_publisher = 0
@@ -164,7 +166,8 @@ class FilteredTopic:
         return {**self._stream_counters, "lost": self._subscription.lost + self.overflowed,
                 "other_publisher": self.other_publisher,
                 "late": self.late, "without_filter": self.unfiltered, "published": self.published,
-                "unpublished": self.unpublished}
+                "unpublished": self.unpublished,
+                **({"withheld": self.withheld} if self.withheld else {})}
 
     def take_queue_depth(self):
         """Most messages that were waiting at once since the last call."""
@@ -324,10 +327,14 @@ class FilteredTopic:
         self._advance()
 
     def _publish(self, processed):
-        published = publish_serialized(self._publisher, processed.messages)
+        messages = processed.messages
+        if not self._node.is_active:
+            self.withheld += len(messages)
+            messages = []
+        published = publish_serialized(self._publisher, messages)
         self.published += published
-        self.unpublished += len(processed.messages) - published
-        if processed.messages:
+        self.unpublished += len(messages) - published
+        if messages:
             self.last_published_s = time.monotonic()
         if self._on_processed:
             self._on_processed(processed, time.time_ns())

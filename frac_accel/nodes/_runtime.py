@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 
 import rclpy
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import (
     InvalidNodeNameException,
     InvalidParameterTypeException,
@@ -39,18 +40,20 @@ class FracAccelNode(Node):
 
     A subclass sets ``done`` when its work is over, and cleans up in `finish`, which is called
     once, before the context is shut down, whether the node is done or a signal has come.
-    ``latency_budget_s`` is how long messages may wait for others to be handled with, ``turns``
-    what is called every ``turn_s`` between them: the longest, too, that a signal goes unnoticed.
+    Outputs are withheld where it is not ``is_active``. ``latency_budget_s`` is how long messages
+    may wait for others to be handled with, ``turns`` what is called every ``turn_s`` between them:
+    the longest, too, that a signal goes unnoticed.
     """
 
     done = False
+    is_active = True
     latency_budget_s = 0.0
     turn_s = 0.1
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, **options) -> None:
         self.direct_subscriptions: list[RawSubscription] = []
         self.turns: list[Callable[[], None]] = []
-        super().__init__(name)
+        super().__init__(name, **options)
 
     def warn_of_unknown_parameters(self) -> None:
         """Name what the user has set and the node does not know, once all is declared.
@@ -76,6 +79,21 @@ class FracAccelNode(Node):
         for subscription in list(self.direct_subscriptions):
             subscription.drain()
         time.sleep(_POLL_S)
+
+    def join(self, executor) -> None:
+        """Let the executor of another program run this node, beside nodes of any kind.
+
+        A timer takes what has come, as often as the latency budget says; `run_node` is quicker.
+        """
+        executor.add_node(self)
+
+        def take() -> None:
+            for subscription in list(self.direct_subscriptions):
+                subscription.drain()
+            self.take_turn()
+        # not the node's clock, which may stand still
+        self.create_timer(max(self.latency_budget_s, _POLL_S), take,
+                          clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def finish(self) -> None:
         """Complete what the node was doing; nothing by default."""

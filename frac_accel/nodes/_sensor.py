@@ -45,7 +45,16 @@ class Sensor:
     def __init__(self, node, name=""):
         self.name, self._node = name, node
         self.model_hash, self.next_report_s = "", 0.0
-        model = None
+        self.channels, self._reference_s = [], None
+        self._reference_subscription = self._temperature_subscription = None
+        try:
+            self._open()
+        except BaseException:
+            self.destroy()
+            raise
+
+    def _open(self):
+        name, node, model = self.name, self._node, None
         if self.value("model_file"):
             model, self.model_hash = node.load(self.value("model_file"))
         elif name:
@@ -53,22 +62,20 @@ class Sensor:
         type_name = self.value("message_type")
         if name:
             topics = self._own_topics(_BLOCKS if type_name == cdr.POINT_CLOUD2 else _SAMPLES)
-            self.channels = (self._channel(type_name, topics),)
+            self.channels.append(self._channel(type_name, topics))
         else:
-            self.channels = (self._channel(type_name, _SAMPLES),
-                             self._channel(cdr.POINT_CLOUD2, _BLOCKS, "blocks/", True))
+            self.channels.append(self._channel(type_name, _SAMPLES))
+            self.channels.append(self._channel(cdr.POINT_CLOUD2, _BLOCKS, "blocks/", True))
         if model:
             for channel in self.channels:
                 channel.topic.offer(model, self._wishes())
             if not node.is_running:
                 self.channels[0].topic.start()
         self._reference = Window(self.value("metrics_window_s"))
-        self._reference_s = self._reference_subscription = None
         if topic := (self.value("reference_topic") if name else "imu/reference"):
             self._reference_subscription = RawSubscription(
                 node, import_message_class(type_name), topic, self._on_reference,
                 raw_qos(self.value("depth")), callback_group=OutsideExecutor())
-        self._temperature_subscription = None
         if topic := self._temperature_topic(model):
             self._temperature_subscription = subscribe_temperature(
                 node, [channel.topic for channel in self.channels], topic)

@@ -39,26 +39,43 @@ class Corrector(FracAccelNode):
     Or what many sensors say, each below its name: parameter ``sensors``.
     """
 
-    def __init__(self):
-        super().__init__("corrector")
-        self.is_running = False
-        self._models, self._figures = {}, {}
+    def __init__(self, name="corrector", is_managed=False, **options):
+        super().__init__(name, **options)
+        self.is_running, self.is_active = False, not is_managed
+        self.sensors, self._models, self._figures, self._services_opened = {}, {}, {}, []
         self._declare_parameters()
-        self.worker = ThreadPoolExecutor(1, "design")
-        self.judge = ThreadPoolExecutor(1, "metrics")
-        self._loader = ThreadPoolExecutor(1, "load")
-        names = [name for name in self.value("sensors") if name]
+        names = self._names_at_start()
         for name in names:
             self._check_name(name, names)
             declare_sensor(self, name)
-        self.sensors = {name: Sensor(self, name) for name in names or [""]}
+        if not is_managed:
+            self.open()
+
+    def open(self):
+        """Load the models, design their filters, and take part: topics, services, diagnostics.
+
+        Raises
+        ------
+        FracAccelError
+            If a parameter or a model cannot be used; `close` then leaves what there is.
+        """
+        self.worker = ThreadPoolExecutor(1, "design")
+        self.judge = ThreadPoolExecutor(1, "metrics")
+        self._loader = ThreadPoolExecutor(1, "load")
+        names = self._names_at_start()
+        for name in names or [""]:
+            if name and not self.has_parameter(f"{name}.model_file"):
+                declare_sensor(self, name)  # it was removed meanwhile
+            self.sensors[name] = Sensor(self, name)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._metrics = self.create_publisher(DiagnosticArray, "~/metrics", 10)
         self.add_on_set_parameters_callback(self._on_parameters)
-        self.create_service(Trigger, "~/reload_model", self._on_reload)
+        self._services_opened = [self.create_service(Trigger, "~/reload_model", self._on_reload)]
         if names:
-            self.create_service(SetParametersAtomically, "~/add_sensor", self._on_add)
-            self.create_service(SetParametersAtomically, "~/remove_sensor", self._on_remove)
+            self._services_opened += [
+                self.create_service(SetParametersAtomically, name, callback)
+                for name, callback in (("~/add_sensor", self._on_add),
+                                       ("~/remove_sensor", self._on_remove))]
         self._load, self._cpu_s, self._load_s = 0.0, time.process_time(), time.monotonic()
         self._spread_reports()
         self.turns.append(self._take_turn)
@@ -69,12 +86,32 @@ class Corrector(FracAccelNode):
         gc.collect()
         gc.freeze()
 
+    def close(self):
+        """Undo `open`, however far it has come."""
+        for sensor in self.sensors.values():
+            sensor.destroy()
+            if sensor.name not in self.value("sensors"):
+                forget_sensor(self, sensor.name)
+        for service in self._services_opened:
+            self.destroy_service(service)
+        if self.is_running:
+            self.turns.remove(self._take_turn)
+            self.remove_on_set_parameters_callback(self._on_parameters)
+            for publisher in (self._diagnostics, self._metrics, *self._figures.values()):
+                self.destroy_publisher(publisher)
+        self.sensors, self._models, self._figures, self._services_opened = {}, {}, {}, []
+        self.is_running = False
+
     def finish(self):
         """Correct what is waiting and say what has been done."""
         for sensor in self.sensors.values():
             sensor.finish()
-        for worker in (self.worker, self.judge, self._loader):
-            worker.shutdown()
+        if self.sensors:
+            for worker in (self.worker, self.judge, self._loader):
+                worker.shutdown()
+
+    def _names_at_start(self):
+        return [name for name in self.value("sensors") if name]
 
     def value(self, name):
         """Value of a parameter."""
@@ -243,6 +280,8 @@ class Corrector(FracAccelNode):
         array = DiagnosticArray(status=statuses)
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(array)
+        if not self.is_active:
+            return
         figures["load"] = self._load
         array.status = [DiagnosticStatus(
             level=statuses[0].level, name=statuses[0].name, hardware_id=statuses[0].hardware_id,

@@ -147,8 +147,8 @@ class Orientation:
             return ""
         text = ", ".join(said)
         if significant:
-            text += f", turned by a further {angle:.2g} +- {max(self.angle_std_deg, 0.01):.1g} deg"
-        text += f" (gain {self.gain:.3g} +- {self.gain_std:.1g}; " + ", ".join(
+            text += f", turned by a further {angle:.2g} ± {max(self.angle_std_deg, 0.01):.1g} deg"
+        text += f" (gain {self.gain:.3g} ± {self.gain_std:.1g}; " + ", ".join(
             f"{self.explained[i]:.0%} of {AXES[i]}" for i in range(3)
             if self.explained[i] > _EXPLAINED) + " explained)"
         return text + ("; an odd number of axes is reversed" if self.mirrored else "")

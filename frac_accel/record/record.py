@@ -311,7 +311,7 @@ def _in_g(step):
 def _with_std(value, std):
     """Value and standard uncertainty with as many digits as that leaves."""
     digits = max(0, int(np.ceil(-np.log10(max(std, 1e-9)))))
-    return f"{value:.{digits}f} +- {std:.1g}"
+    return f"{value:.{digits}f} ± {std:.1g}"
 
 
 def _far(offset, one, two):

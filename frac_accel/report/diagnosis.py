@@ -5,7 +5,7 @@ from ..model.parameters import parameter_fields
 from .diagnosis_figures import discrepancy
 from .figures import COVERAGE_FACTOR
 from .page import Page
-from .quantity import percent, rounded
+from .quantity import percent, rounded, scaled, written
 from .rivals import rivals
 from .signals import sentence
 
@@ -101,9 +101,7 @@ def _short(finding):
     """One cause in one line."""
     values = []
     for name, entry in finding.as_dict()["parameters"].items():
-        value, std = rounded(entry["value"], entry["std"])
-        spread = f" ± {std}" if std else ""
-        values.append(f"{name} {value}{spread} {_unit(entry)}".strip())
+        values.append(f"{name} {written(entry['value'], entry['std'], entry['unit'])}")
     return (f"{finding.cause} ({', '.join(values)}). {finding.effect.explanation} Without it the "
             f"held-out error is {finding.gain.before:.4g}, with it {finding.gain.after:.4g}: "
             f"{finding.gain.reduction:.1%} less.")
@@ -132,22 +130,19 @@ def _listed(causes):
     return " or ".join(causes)
 
 
-def _unit(entry):
-    unit = entry["unit"].replace("^2", "²")
-    return "" if unit == "1" else unit
-
-
 def _causes(section, found):
     parameters, gains = [], []
     for finding in found.findings:
         for name, entry in finding.as_dict()["parameters"].items():
-            value, std = entry["value"], entry["std"]
+            factor, unit = scaled(entry["value"], entry["unit"])
+            value = entry["value"] if isinstance(entry["value"], str) else factor * entry["value"]
+            std = factor * entry["std"]
             shown, uncertainty = rounded(value, std)
             half = COVERAGE_FACTOR * std
             interval = (f"{rounded(value - half, std)[0]} to {rounded(value + half, std)[0]}"
                         if uncertainty else "–")
             parameters.append([finding.cause, name, shown, uncertainty or "–", interval,
-                               entry["unit"].replace("^2", "²")])
+                               unit or "1"])
         g = finding.gain
         gains.append([finding.cause, f"{g.before:.4g}", f"{g.after:.4g}", f"{g.reduction:.2%}",
                       f"{g.ci95[0]:.2%} to {g.ci95[1]:.2%}", f"{finding.confidence:.3f}"])

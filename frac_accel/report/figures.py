@@ -1,6 +1,5 @@
 """Figures of the reports. Each function gives a plotly figure for `Section.figure`.
 
-Colours are chosen to be read on white and on dark paper; the page sets those of axes and text.
 Signals of any length are thinned to their envelope, so that a page stays small.
 """
 
@@ -9,16 +8,12 @@ import dataclasses
 import numpy as np
 
 from ..signals.thinning import envelope
-from .page import require_plotly
+from . import panels
+from .panels import COVERAGE_FACTOR, MEASURED, MODEL, RESIDUAL, SERIES
 
-MEASURED = "#8a919a"
-MODEL = "#2f86c9"
-RESIDUAL = "#d9772b"
-SERIES = (MODEL, RESIDUAL, "#3d9c63", "#9467bd", MEASURED, "#c2498a")
-
-_FONT = "system-ui, -apple-system, 'Segoe UI', 'DejaVu Sans', sans-serif"
-# Half-width of a 95 % interval in standard uncertainties, as calibration certificates have it.
-COVERAGE_FACTOR = 2.0
+__all__ = ["COVERAGE_FACTOR", "MEASURED", "MODEL", "RESIDUAL", "SERIES", "ResponseCurve", "bode",
+           "bode_curves", "correlation", "envelope", "lines", "mark_band", "response_deviation",
+           "response_interval", "shades", "spectra", "time_signals"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,28 +52,28 @@ def bode(curve, points=None, modelled=None, unit="output units per m/s²"):
     -------
     plotly.graph_objects.Figure
     """
-    figure = _rows(2, 560, "frequency [Hz]", [f"amplitude [{unit}]", "phase [°]"],
+    figure = panels.rows(2, 560, "frequency [Hz]", [f"amplitude [{unit}]", "phase [°]"],
                    weights=(0.6, 0.4), x_type="log")
     amplitude, phase = np.abs(curve.response), np.unwrap(np.angle(curve.response))
     frequency = curve.frequency_hz
     if curve.amplitude_interval is not None:
         low, high = curve.amplitude_interval
-        _band(figure, frequency, amplitude * (1 + low), amplitude * (1 + high), 1)
+        panels.band(figure, frequency, amplitude * (1 + low), amplitude * (1 + high), 1)
         low, high = curve.phase_interval_rad
-        _band(figure, frequency, np.degrees(phase + low), np.degrees(phase + high), 2,
+        panels.band(figure, frequency, np.degrees(phase + low), np.degrees(phase + high), 2,
               legend=False)
     if points is not None:
         ratio = points.response / modelled
         # on the model's branch, so that no point lies a turn away
         own = np.interp(points.frequency_hz, frequency, phase) + np.angle(ratio)
         size = np.abs(points.response)
-        _points(figure, points.frequency_hz, size, 1, size * points.std_amplitude)
-        _points(figure, points.frequency_hz, np.degrees(own), 2, np.degrees(points.std_phase_rad),
-                legend=False)
-    _line(figure, frequency, amplitude, 1, "model", MODEL)
-    _line(figure, frequency, np.degrees(phase), 2, "model", MODEL, legend=False)
+        panels.points(figure, points.frequency_hz, size, 1, size * points.std_amplitude)
+        panels.points(figure, points.frequency_hz, np.degrees(own), 2,
+                      np.degrees(points.std_phase_rad), legend=False)
+    panels.line(figure, frequency, amplitude, 1, "model", MODEL)
+    panels.line(figure, frequency, np.degrees(phase), 2, "model", MODEL, legend=False)
     figure.update_yaxes(type="log", row=1, col=1)
-    return figure
+    return panels.finished(figure)
 
 
 def bode_curves(frequency_hz, curves, colours=SERIES):
@@ -96,13 +91,11 @@ def bode_curves(frequency_hz, curves, colours=SERIES):
     -------
     plotly.graph_objects.Figure
     """
-    figure = _rows(2, 520, "frequency [Hz]", ["magnitude [dB]", "phase [°]"], x_type="log")
+    figure = panels.rows(2, 520, "frequency [Hz]", ["magnitude [dB]", "phase [°]"], x_type="log")
     for (name, parts), colour in zip(curves.items(), colours):
         for row, values in enumerate(parts, 1):
-            _line(figure, frequency_hz, values, row, name, colour, legend=row == 1)
-    decades = np.log10(frequency_hz[-1] / frequency_hz[0])
-    figure.update_xaxes(dtick=1 if decades > 2.5 else "D2", exponentformat="power")
-    return figure
+            panels.line(figure, frequency_hz, values, row, name, colour, legend=row == 1)
+    return panels.finished(figure)
 
 
 def shades(count, first=(47, 134, 201), last=(217, 119, 43)):
@@ -126,21 +119,22 @@ def response_deviation(curve, points, modelled):
     -------
     plotly.graph_objects.Figure
     """
-    figure = _rows(2, 520, "frequency [Hz]", ["amplitude [%]", "phase [°]"], x_type="log")
+    figure = panels.rows(2, 520, "frequency [Hz]", ["amplitude [%]", "phase [°]"], x_type="log")
     ratio = points.response / modelled
     spreads = 100 * np.abs(ratio) * points.std_amplitude, np.degrees(points.std_phase_rad)
     if curve.amplitude_interval is not None:
-        _band(figure, curve.frequency_hz, *(100 * limit for limit in curve.amplitude_interval), 1)
-        _band(figure, curve.frequency_hz, *map(np.degrees, curve.phase_interval_rad), 2,
-              legend=False)
+        panels.band(figure, curve.frequency_hz,
+                    *(100 * limit for limit in curve.amplitude_interval), 1)
+        panels.band(figure, curve.frequency_hz, *map(np.degrees, curve.phase_interval_rad), 2,
+                    legend=False)
     zero = np.zeros(2)
     ends = curve.frequency_hz[[0, -1]]
     shown = 100 * (np.abs(ratio) - 1), np.degrees(np.angle(ratio))
     for row, (values, spread) in enumerate(zip(shown, spreads), 1):
-        _points(figure, points.frequency_hz, values, row, spread, legend=row == 1)
-        _line(figure, ends, zero, row, "model", MODEL, legend=row == 1)
-        _focus(figure, values, row)
-    return figure
+        panels.points(figure, points.frequency_hz, values, row, spread, legend=row == 1)
+        panels.line(figure, ends, zero, row, "model", MODEL, legend=row == 1)
+        panels.focus(figure, values, row)
+    return panels.finished(figure)
 
 
 def response_interval(curve):
@@ -155,13 +149,14 @@ def response_interval(curve):
     -------
     plotly.graph_objects.Figure
     """
-    figure = _rows(2, 420, "frequency [Hz]", ["amplitude [± %]", "phase [± °]"], x_type="log")
+    figure = panels.rows(2, 420, "frequency [Hz]", ["amplitude [± %]", "phase [± °]"], x_type="log")
     low, high = curve.amplitude_interval
-    _line(figure, curve.frequency_hz, 50 * (high - low), 1, "amplitude", MODEL, legend=False)
+    panels.line(figure, curve.frequency_hz, 50 * (high - low), 1, "amplitude", MODEL, legend=False)
     low, high = curve.phase_interval_rad
-    _line(figure, curve.frequency_hz, np.degrees(high - low) / 2, 2, "phase", MODEL, legend=False)
+    panels.line(figure, curve.frequency_hz, np.degrees(high - low) / 2, 2, "phase", MODEL,
+                legend=False)
     figure.update_yaxes(rangemode="tozero")
-    return figure
+    return panels.finished(figure)
 
 
 def mark_band(figure, band_hz):
@@ -201,23 +196,22 @@ def time_signals(time_s, signals, residual=None, unit="output units"):
     -------
     plotly.graph_objects.Figure
     """
-    def thin(values):
-        return values if isinstance(values, tuple) else envelope(time_s, values)
+    def draw(values, row, name, colour, legend=True, width=1.4):
+        x, y = values if isinstance(values, tuple) else (time_s, values)
+        panels.signal(figure, x, y, row, name, colour, legend, width)
     rows = 1 if residual is None else 2
     labels = [f"output<br>[{unit}]", f"residual<br>[{unit}]"][:rows]
-    figure = _rows(rows, 280 + 200 * (rows - 1), "time [s]", labels,
-                   weights=(0.6, 0.4) if rows == 2 else None)
+    figure = panels.rows(rows, 280 + 200 * (rows - 1), "time [s]", labels,
+                         weights=(0.6, 0.4) if rows == 2 else None)
     colours = dict(zip(signals, (MEASURED, *SERIES)))
     for name, values in signals.items():
         # the measured signal shows on both sides of the model that is drawn upon it
-        _line(figure, *thin(values), 1, name, colours[name],
-              width=3 if colours[name] is MEASURED else 1.2)
+        draw(values, 1, name, colours[name], width=3 if colours[name] is MEASURED else 1.2)
     if isinstance(residual, dict):
         for name, values in residual.items():
-            _line(figure, *thin(values), 2, f"residual of the {name}", colours[name],
-                  legend=False)
+            draw(values, 2, f"residual of the {name}", colours[name], legend=False)
     elif residual is not None:
-        _line(figure, *thin(residual), 2, "residual", RESIDUAL)
+        draw(residual, 2, "residual", RESIDUAL)
     return figure
 
 
@@ -240,16 +234,16 @@ def spectra(frequency_hz, densities, unit="output units", level=None,
     -------
     plotly.graph_objects.Figure
     """
-    figure = _rows(1, 420, "frequency [Hz]", [f"density [{unit}/√Hz]"], x_type="log")
+    figure = panels.rows(1, 420, "frequency [Hz]", [f"density [{unit}/√Hz]"], x_type="log")
     above = frequency_hz > 0
     for (name, values), colour in zip(densities.items(), colours):
-        _line(figure, frequency_hz[above], values[above], 1, name, colour,
+        panels.line(figure, frequency_hz[above], values[above], 1, name, colour,
               legend=len(densities) > 1 or level is not None)
     if level is not None:
-        _line(figure, frequency_hz[above][[0, -1]], np.full(2, level), 1, "white noise", MODEL,
-              dash="dot")
-    figure.update_yaxes(type="log", exponentformat="power")
-    return figure
+        panels.line(figure, frequency_hz[above][[0, -1]], np.full(2, level), 1, "white noise",
+                    MODEL, dash="dot")
+    figure.update_yaxes(type="log")
+    return panels.finished(figure)
 
 
 def correlation(lags, values, bound, x_label="lag [samples]", y_label="correlation"):
@@ -266,15 +260,15 @@ def correlation(lags, values, bound, x_label="lag [samples]", y_label="correlati
     -------
     plotly.graph_objects.Figure
     """
-    figure = _rows(1, 320, x_label, [y_label])
+    figure = panels.rows(1, 320, x_label, [y_label])
     bound = np.broadcast_to(bound, np.shape(lags))
-    _band(figure, lags, -bound, bound, 1, name="chance alone")
+    panels.band(figure, lags, -bound, bound, 1, name="chance alone")
     stems = np.full(3 * len(lags), np.nan)
     stems[0::3], stems[1::3] = 0, values
-    _line(figure, np.repeat(lags, 3), stems, 1, "", RESIDUAL, legend=False)
-    _add(figure, 1, x=lags, y=values, mode="markers", name=y_label, showlegend=False,
+    panels.line(figure, np.repeat(lags, 3), stems, 1, "", RESIDUAL, legend=False)
+    panels.add(figure, 1, x=lags, y=values, mode="markers", name=y_label, showlegend=False,
          marker={"color": RESIDUAL, "size": 4})
-    return figure
+    return panels.finished(figure)
 
 
 def lines(x, series, x_label, y_label, band=None, points=None, log=""):
@@ -296,63 +290,14 @@ def lines(x, series, x_label, y_label, band=None, points=None, log=""):
     -------
     plotly.graph_objects.Figure
     """
-    figure = _rows(1, 380, x_label, [y_label], x_type="log" if "x" in log else "linear")
+    figure = panels.rows(1, 380, x_label, [y_label], x_type="log" if "x" in log else "linear")
     if band is not None:
-        _band(figure, x, *band, 1)
+        panels.band(figure, x, *band, 1)
     if points is not None:
-        _points(figure, points[0], points[1], 1, points[2] if len(points) > 2 else None)
+        panels.points(figure, points[0], points[1], 1, points[2] if len(points) > 2 else None)
     alone = len(series) == 1 and band is None and points is None
     for (name, values), colour in zip(series.items(), SERIES):
-        _line(figure, *envelope(x, values), 1, name, colour, legend=not alone)
+        panels.line(figure, *envelope(x, values), 1, name, colour, legend=not alone)
     if "y" in log:
         figure.update_yaxes(type="log")
-    return figure
-
-
-def _rows(rows, height, x_label, y_labels, weights=None, x_type="linear"):
-    """Empty figure of panels above each other on a common axis."""
-    require_plotly()
-    from plotly.subplots import make_subplots
-    figure = make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.06,
-                           row_heights=list(weights) if weights else None)
-    figure.update_layout(
-        template="none", height=height, margin={"l": 76, "r": 16, "t": 34, "b": 52},
-        font={"family": _FONT, "size": 13},
-        legend={"orientation": "h", "x": 0, "y": 1, "yanchor": "bottom"}, hovermode="closest")
-    figure.update_xaxes(type=x_type, showline=True, ticks="outside", zeroline=False, mirror=True)
-    figure.update_yaxes(showline=True, ticks="outside", zeroline=False, mirror=True,
-                        automargin=True, title={"standoff": 8})
-    if x_type == "log":
-        figure.update_xaxes(dtick="D2")
-    figure.update_xaxes(title={"text": x_label}, row=rows, col=1)
-    for row, label in enumerate(y_labels, 1):
-        figure.update_yaxes(title={"text": label}, row=row, col=1)
-    return figure
-
-
-def _line(figure, x, y, row, name, colour, legend=True, dash="solid", width=1.4):
-    _add(figure, row, x=x, y=y, mode="lines", name=name, showlegend=legend,
-         line={"color": colour, "width": width, "dash": dash})
-
-
-def _points(figure, x, y, row, std=None, legend=True):
-    error = None if std is None else {"array": COVERAGE_FACTOR * std, "thickness": 1, "width": 2}
-    _add(figure, row, x=x, y=y, mode="markers", name="measured", showlegend=legend, error_y=error,
-         marker={"color": RESIDUAL, "size": 4})
-
-
-def _band(figure, x, low, high, row, name="95 % interval", legend=True):
-    _add(figure, row, x=np.r_[x, x[::-1]], y=np.r_[high, low[::-1]], mode="lines", fill="toself",
-         name=name, showlegend=legend, hoverinfo="skip", line={"width": 0, "color": MODEL},
-         fillcolor="rgba(47, 134, 201, 0.25)")
-
-
-def _focus(figure, values, row):
-    """Let the middle of the values choose the range: a few wild ones must not hide the rest."""
-    size = np.nanpercentile(np.abs(values), 90) if len(values) else 0
-    if size > 0:
-        figure.update_yaxes(range=[-2.5 * size, 2.5 * size], row=row, col=1)
-
-
-def _add(figure, row, **trace):
-    figure.add_scatter(**trace, row=row, col=1)
+    return panels.finished(figure)

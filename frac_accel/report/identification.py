@@ -7,7 +7,7 @@ from ..identification.evidence import MOST_POINTS
 from ..uncertainty import response_uncertainty
 from . import figures
 from .page import Page
-from .quantity import left_open_by, percent, rounded
+from .quantity import left_open_by, percent, rounded, scaled, written
 from .signals import sentence, thinned
 
 # Frequencies of the drawn response.
@@ -67,7 +67,8 @@ def _parameters(section, result):
         if name in left_open:
             rows.append([name, "open: not determined", "–", "–", "–", entry["unit"]])
             continue
-        value, std = entry["value"], entry["std"]
+        factor, unit = scaled(entry["value"], entry["unit"])
+        value, std = factor * entry["value"], factor * entry["std"]
         shown, uncertainty = rounded(value, std)
         half = figures.COVERAGE_FACTOR * std
         known = bool(uncertainty)
@@ -75,7 +76,7 @@ def _parameters(section, result):
             name, shown, uncertainty or "–",
             percent(std / abs(value)) if known and value else "–",
             f"{rounded(value - half, std)[0]} to {rounded(value + half, std)[0]}" if known else "–",
-            entry["unit"].replace("^2", "²")])
+            unit or "1"])
     section.table(["parameter", "value", "standard uncertainty", "relative",
                    "95 % interval (k = 2)", "unit"], rows,
                   "Estimates. The uncertainties allow for a residual that is not white; they do "
@@ -169,11 +170,13 @@ def _frequency_domain(section, result):
         own = result.parameters[name]
         difference = entry["value"] - own["value"]
         combined = np.hypot(entry["std"], own["std"])
-        rows.append([name, *rounded(own["value"], own["std"]),
-                     *rounded(entry["value"], entry["std"]), f"{difference / combined:.2f}"])
-    section.table(["parameter", "time domain", "u", "frequency domain", "u", "difference / u"],
-                  rows, "The same structure fitted to the signals and to the points above; u are "
-                  "standard uncertainties, the last of the difference as if both were independent.")
+        rows.append([name, written(own["value"], own["std"], own["unit"]),
+                     written(entry["value"], entry["std"], own["unit"]),
+                     f"{difference / combined:.2f}"])
+    section.table(["parameter", "time domain", "frequency domain", "difference / u"],
+                  rows, "The same structure fitted to the signals and to the points above, ± "
+                  "standard uncertainties; u is that of the difference as if both were "
+                  "independent.")
 
 
 def _residual(section, seen, noise):
@@ -181,7 +184,8 @@ def _residual(section, seen, noise):
         signals = dict(seen.signals[view])
         residual = signals.pop("residual")
         return figures.time_signals(None, signals, residual)
-    section.figure(drawn("whole"), "Sensor's output, measured and by the model, and the residual"
+    section.figure(drawn("whole"),
+                   "Sensor's output, measured and by the model, and the residual"
                    + thinned(seen.samples, MOST_POINTS))
     if "close_up" in seen.signals:
         section.figure(drawn("close_up"),

@@ -117,6 +117,10 @@ class Section:
         self._counts = counts
         self._parts = []
 
+    def subheading(self, words):
+        """Add a heading within the section."""
+        return self._add(f"<h3>{html.escape(words)}</h3>")
+
     def text(self, words):
         """Add a paragraph."""
         return self._add(f"<p>{html.escape(words)}</p>")

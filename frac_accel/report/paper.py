@@ -151,5 +151,6 @@ def _claims(section, result):
                   [[claim.key.replace("_", " "), claim.where, claim.status]
                    for claim in result.claims], "All claims; details follow in the same order.")
     for claim in result.claims:
+        section.subheading(claim.key.replace("_", " ").capitalize())
         section.text(f"{sentence(claim.where)} {claim.claim}")
         section.items([f"{sentence(claim.status)} {claim.cause}", f"Computed: {claim.evidence}"])

@@ -8,7 +8,7 @@ from ..paper.study.candidates import CLASSICAL, FRACTIONAL
 from ..paper.study.map import BANDS_HZ, NOISE_DB, ORDERS, SEEDS, VERDICTS
 from ..paper.study.sweep import best
 from . import figures
-from .quantity import rounded
+from .quantity import written
 from .signals import sentence
 
 
@@ -49,8 +49,7 @@ def _bench(section, study):
     rows = []
     for name, found in study.diagnoses.items():
         causes = [f"{finding['cause']}: " + ", ".join(
-            f"{parameter} {' ± '.join(filter(None, rounded(entry['value'], entry['std'])))} "
-            f"{entry['unit']}".removesuffix(" 1")
+            f"{parameter} {written(entry['value'], entry['std'], entry['unit'])}"
             for parameter, entry in finding["parameters"].items())
             for finding in found["findings"]]
         rows.append([study.bench[name].words, found["verdict"], "; ".join(causes) or "none"])

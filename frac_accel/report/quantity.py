@@ -1,8 +1,78 @@
 """Values with standard uncertainties as text."""
 
 import math
+from typing import NamedTuple
 
 from ..model.parameters import parameter_fields
+
+# What numbers of these units are given a prefix for, so that nobody counts zeros.
+_PREFIXED = ("s", "Hz")
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+
+
+class Scaled(NamedTuple):
+    """What to multiply numbers with, and the unit that they have then; empty where it is one."""
+
+    factor: float
+    unit: str
+
+
+def scaled(value, unit, least=1.0):
+    """Unit with the SI prefix with which a value is between `least` and a thousand times that.
+
+    Examples
+    --------
+    >>> scaled(0.00129994, "s").unit, scaled(180.0, "Hz").unit, scaled(1e-4, "1/K").unit
+    ('ms', 'Hz', '1/K')
+    """
+    shown = "" if unit == "1" else unit.replace("^2", "²")
+    if unit not in _PREFIXED or isinstance(value, str) or not math.isfinite(value) or not value:
+        return Scaled(1.0, shown)
+    # a value such as 999.9999999 is not far enough below a thousand to be told from it
+    power = 3 * math.floor(round(math.log10(abs(value) / least), 9) / 3)
+    power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
+    return Scaled(10.0**-power, _PREFIXES[power] + shown)
+
+
+def written(value, std, unit):
+    """A value with its standard uncertainty and unit, both with the prefixes that suit them.
+
+    Parameters
+    ----------
+    value : float or str
+    std : float
+    unit : str
+        SI.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> written(0.00129994123, 1.1e-7, "s")
+    '1.29994 ms ± 0.11 µs'
+    >>> written(180.00328, 0.0094, "Hz"), written(0.149952, 4.8e-5, "1")
+    ('180.0033 Hz ± 9.4 mHz', '0.149952 ± 0.000048')
+    >>> written(0.00024998, 5.8e-8, "1/m^2")
+    '(2.49980 ± 0.00058)e-04 1/m²'
+    """
+    if isinstance(value, str):
+        return f"{value} {scaled(value, unit).unit}".rstrip()
+    large = scaled(value if abs(value) > std or not std > 0 else std, unit)
+    shown, spread = rounded(value * large.factor, std * large.factor)
+    small = large
+    if spread and unit in _PREFIXED:
+        # two digits, neither of them a zero that only fills up
+        small = scaled(std, unit, 0.1)
+        spread = rounded(std * small.factor, std * small.factor)[1]
+    if not spread:
+        return f"{shown} {large.unit}".rstrip()
+    if small == large:
+        number, mark, exponent = shown.partition("e")
+        both = f"{number} ± {spread.partition('e')[0]}"
+        return f"{f'({both})e{exponent}' if mark else both} {large.unit}".rstrip()
+    return f"{shown} {large.unit} ± {spread} {small.unit}"
 
 
 def rounded(value, std):

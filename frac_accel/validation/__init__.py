@@ -13,7 +13,7 @@ from ..io.samples import Samples
 from ..model import AXES, SensorModel
 from ..record import Record
 from ..record.sources import pair_of
-from ..shown import Shown
+from ..shown import Shown, above
 from ..signals.metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
 from ..signals.thinning import envelope
 from ..simulation import simulate
@@ -34,6 +34,8 @@ class Comparison:
         Of the raw samples as they are, divided by the model's sensitivity, and corrected.
     stamps_ns, reference, before, after : ndarray, shape (n,)
         What was compared: instants, the reference there, scaled raw and corrected samples.
+    std : ndarray, shape (n,)
+        Standard uncertainty that the corrected samples state; NaN where they state none.
     """
 
     raw: ErrorMetrics
@@ -43,6 +45,7 @@ class Comparison:
     reference: np.ndarray
     before: np.ndarray
     after: np.ndarray
+    std: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,7 +85,7 @@ class Validation(Shown):
                                        "corrected": seen.after - seen.reference})):
             for name, values in signals.items():
                 axes.plot(*envelope(time, values), label=name, linewidth=0.8)
-            axes.legend(loc="upper right")
+            above(axes)
         upper.set_ylabel("acceleration [m/s²]")
         lower.set(xlabel="time [s]", ylabel="error [m/s²]")
 
@@ -134,15 +137,16 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     pair = Record.of(reference, sensor, axis)
     corrector = Corrector(model, **wishes)
     parts = [*_corrected(corrector, sensor, temperature_at), corrector.finish()]
-    stamps, values = (np.concatenate([getattr(part, name) for part in parts])
-                      for name in ("stamps_ns", "values"))
+    stamps, values, variance = (np.concatenate([getattr(part, name) for part in parts])
+                                for name in ("stamps_ns", "values", "variance"))
     if corrector.design is None:
         raise FracAccelError("the stamps of the sensor's samples tell no rate: most samples are "
                              "missing between them")
     if not len(stamps):
         raise FracAccelError(f"{len(sensor.stamps_ns)} samples are fewer than the filter needs to "
                              f"warm up ({corrector.design.warm_up_samples})")
-    comparison = compare(reference, sensor, Samples.of(stamps, values), corrector.design, axis)
+    comparison = compare(reference, sensor, Samples.of(stamps, values, variance),
+                         corrector.design, axis)
     bands = [band.band_hz for band in comparison.corrected.bands]
     measured, simulated = _simulated(model, pair, AXES.index(axis), temperature_at)
     return Validation(
@@ -201,7 +205,8 @@ def compare(reference, sensor, corrected, design, axis="x"):
         raw=error_metrics(truth_raw, raw, rate, bands),
         scaled=error_metrics(truth_raw, scaled, rate, bands),
         corrected=error_metrics(truth, after, rate, bands),
-        stamps_ns=stamps, reference=truth, before=scaled, after=after)
+        stamps_ns=stamps, reference=truth, before=scaled, after=after,
+        std=np.sqrt(corrected.variance[run, column]))
 
 
 def _known_reference(pair):

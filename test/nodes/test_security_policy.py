@@ -39,16 +39,17 @@ def test_only_maintenance_may_change_a_model():
     asking = {profile.get("node") for profile in POLICY.iter("profile")
               for group in profile.iter("services") if group.get("request") == "ALLOW"
               for service in group.iter("service")
-              if re.search("set_parameters|reload_model|_sensor", service.text)}
+              if re.search("set_parameters|reload_model|_sensor|change_state", service.text)}
     assert asking == {"maintenance"}
     own = set(re.findall(r'"(~/[a-z]+_[a-z]+)"',
                          (ROOT / "frac_accel" / "nodes" / "corrector.py").read_text()))
     assert own == {"~/reload_model", "~/add_sensor", "~/remove_sensor"}
-    assert own | {"~/set_parameters"} <= allowed("corrector", "service", "reply")
+    managed = {"~/change_state", "~/get_state"}
+    assert own | managed | {"~/set_parameters"} <= allowed("corrector", "service", "reply")
 
 
 def test_every_pin_has_a_hash_and_pip_asks_for_them():
-    for name in ("venv", "oldest"):
+    for name in ("venv", "oldest", "docs"):
         text = (ROOT / "requirements" / f"{name}.txt").read_text()
         pins = re.findall(r"^[A-Za-z0-9][^\n]*==[^\n]*(?:\n    --hash=sha256:[0-9a-f]{64}[^\n]*)*",
                           text, re.M)

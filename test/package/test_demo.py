@@ -5,6 +5,7 @@ import re
 import pytest
 
 from frac_accel import SensorModel, demo
+from frac_accel.report.quantity import written
 
 
 @pytest.mark.ros
@@ -14,13 +15,14 @@ def test_demo(tmp_path, capsys):
     assert {"identification.html", "model.yaml", "demo.mcap", "demo.txt", "demo.png"} <= {
         path.name for path in tmp_path.iterdir()}
     assert "bit-identical to the offline correction" in printed
-    core = SensorModel.load(tmp_path / "model.yaml").core
+    model = SensorModel.load(tmp_path / "model.yaml")
     true = SensorModel.load(demo.BAGS / "viscoelastic_bench.yaml").core
     for name in ("natural_frequency_hz", "damping_ratio", "damping_order", "sensitivity"):
-        value, std, truth = map(float, re.search(rf"{name} +(\S+) +(\S+) +(\S+)", printed).groups())
-        assert truth == getattr(true, name)
-        assert value == pytest.approx(getattr(core, name), abs=std)
-        assert abs(value - truth) < 4 * std
+        shown, truth = re.search(rf"{name} +(\S.*?)  +true: (\S+)", printed).groups()
+        value, known = getattr(model.core, name), model.metadata["uncertainties"][name]
+        assert shown == written(value, known["std"], known["unit"])
+        assert float(truth) == getattr(true, name)
+        assert abs(value - float(truth)) < 4 * known["std"]
     axes = re.findall(r"^  [xyz] +\S+ +(\S+) +(\S+)", printed, re.MULTILINE)
     assert len(axes) == 3
     for before, after in axes:

@@ -4,6 +4,7 @@ import ast
 import configparser
 import importlib.metadata
 import json
+import math
 import os
 import re
 import runpy
@@ -12,15 +13,17 @@ import sys
 import sysconfig
 import xml.etree.ElementTree
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
 
 from frac_accel.cli import main
 from frac_accel.model import SensorModel
+from frac_accel.report import layouts
 
 ROOT = Path(__file__).parents[2]
-NODES = ("corrector", "player", "recorder", "virtual_sensor")
+NODES = ("corrector", "managed_corrector", "player", "recorder", "virtual_sensor")
 
 
 def run(command, **kwargs):
@@ -226,7 +229,8 @@ def test_launch_file_is_a_description(name):
     assert len(namespace["generate_launch_description"]().entities) > 1
 
 
-@pytest.mark.parametrize("node", NODES)
+# the managed corrector has the name and the parameters of the other
+@pytest.mark.parametrize("node", sorted({*NODES} - {"managed_corrector"}))
 def test_launch_and_config_set_only_parameters_of_the_node(node):
     given = set()
     for path in (ROOT / "launch").glob("*.launch.py"):
@@ -254,14 +258,58 @@ def test_example_models_load():
 
 
 def test_layouts_plot_raw_reference_and_corrected():
-    foxglove = json.loads((ROOT / "config" / "foxglove_layout.json").read_text())
-    paths = {path["value"] for panel in foxglove["configById"].values()
-             for path in panel.get("paths", [])}
-    tree = xml.etree.ElementTree.parse(ROOT / "config" / "plotjuggler_layout.xml")
+    text = (ROOT / "config" / "foxglove_layout.json").read_text(encoding="utf-8")
+    assert text == layouts.foxglove(layouts.Topics())
+    panels = json.loads(text)["configById"].values()
+    assert all(panel["foxglovePanelTitle"] for panel in panels)
+    paths = {path["value"] for panel in panels for path in panel.get("paths", [])}
+    file = ROOT / "config" / "plotjuggler_layout.xml"
+    assert file.read_text(encoding="utf-8") == layouts.plotjuggler(layouts.Topics())
+    tree = xml.etree.ElementTree.parse(file)
     curves = {curve.get("name") for curve in tree.iter("curve")}
-    assert {path.replace(".", "/") for path in paths} == curves
+    bands = {snippet.get("name") for snippet in tree.iter("snippet")}
+    assert len(bands) == 6 and bands < curves
+    assert {path.replace(".", "/") for path in paths if "2u" not in path} == curves - bands
     for topic in ("/imu/data_raw", "/imu/reference", "/imu/data"):
         assert f"{topic}/linear_acceleration/x" in curves
+    assert all(area.get("name") not in ("", "...") for area in tree.iter("DockArea"))
+
+
+def test_layouts_of_a_namespace(tmp_path):
+    for program in ("foxglove", "plotjuggler"):
+        file = tmp_path / program
+        assert main(["layout", program, "--namespace", "/axle/front/", "-o", str(file)]) == 0
+        text = file.read_text(encoding="utf-8")
+        names = re.findall(r'(?<!/studio_script)(/[\w/]*(?:/imu/|metrics)[\w/]*)', text)
+        assert names and all(name.startswith(("/axle/front/imu/", "/axle/front/corrector/metrics"))
+                             for name in names)
+        assert main(["layout", program, "--namespace", "axle front", "-o", str(file)]) == 2
+        assert main(["layout", program, "--node", "/corrector", "--sensor", "front",
+                     "-o", str(file)]) == 0
+        assert "/corrector/metrics/front/x/raw/nrmse" in file.read_text(encoding="utf-8")
+
+
+def test_the_band_of_a_layout_is_two_uncertainties_about_the_sample():
+    """Each program's expression, run as Python."""
+    source = json.loads(layouts.foxglove(layouts.Topics()))["userNodes"]["band"]["sourceCode"]
+    acceleration = SimpleNamespace(x=1.0, y=2.0, z=3.0)
+    covariance = [0.01, 0, 0, 0, 0.04, 0, 0, 0, 0.09]
+    for end, sign in (("lower", -1), ("upper", 1)):
+        inner = re.search(rf"{end}: {{ (.*) }},", source)[1]
+        found = {name: eval(expression.replace("Math", "math"),
+                            {"a": acceleration, "c": covariance, "math": math})
+                 for name, expression in (part.split(": ") for part in inner.split(", "))}
+        assert found == pytest.approx({"x": 1 + sign * 0.2, "y": 2 + sign * 0.4,
+                                       "z": 3 + sign * 0.6})
+    tree = xml.etree.ElementTree.fromstring(layouts.plotjuggler(layouts.Topics()))
+    for snippet in tree.iter("snippet"):
+        axis, sign = snippet.get("name").split()[1:3]
+        found = eval(snippet.findtext("function").removeprefix("return "),
+                     {"value": 5.0, "v1": 0.25, "math": math})
+        assert found == 5.0 + (1.0 if sign == "+" else -1.0)
+        place = "xyz".index(axis)
+        assert snippet.findtext("additional_sources/v1").endswith(f"covariance[{place};{place}]")
+        assert snippet.findtext("linked_source").endswith(f"/{axis}")
 
 
 def test_version_is_the_same_everywhere():

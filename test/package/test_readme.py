@@ -1,4 +1,4 @@
-"""Every example of README.md runs, and prints what the page shows."""
+"""Every example of the pages runs, and prints what the page shows."""
 
 import os
 import re
@@ -12,26 +12,37 @@ from frac_accel import SensorModel, read_bag
 from frac_accel.streaming import Corrector
 
 
-def test_console_examples(tmp_path):
-    examples = [pair for block in readme_examples.blocks("console")
-                for pair in readme_examples.commands(block)]
-    assert len(examples) >= 8
-    for command, shown in examples:
+def examples(page):
+    return [pair for block in readme_examples.blocks("console", page)
+            for pair in readme_examples.commands(block)]
+
+
+def test_there_are_examples():
+    assert sum(len(examples(page)) for page in readme_examples.PAGES) >= 15
+
+
+@pytest.mark.parametrize("page", [*filter(examples, readme_examples.PAGES)], ids=lambda p: p.stem)
+def test_console_examples(page, tmp_path):
+    for command, shown in examples(page):
         printed = readme_examples.run(command, tmp_path)
         assert readme_examples.same(shown, printed), f"$ {command}\n{printed}"
+
+
+PYTHON = readme_examples.ROOT / "docs" / "how_to" / "python.md"
 
 
 def test_python_examples(tmp_path, monkeypatch, capsys):
     (tmp_path / "bags").symlink_to(readme_examples.ROOT / "bags")
     monkeypatch.chdir(tmp_path)
-    for block in readme_examples.blocks("python"):
+    for block in readme_examples.blocks("python", PYTHON):
         exec(block, {})
     assert re.match(r"3\d\d\d samples, noise gain \d\.\d\d", capsys.readouterr().out)
 
 
 @pytest.mark.ros
 def test_live_example(tmp_path):
-    script, = [block for block in readme_examples.blocks("sh") if "ros2 run" in block]
+    script, = [block for block in readme_examples.blocks("sh", readme_examples.README)
+               if "ros2 run" in block]
     with ros_domain() as environment:
         # the corrector would run for ever: it ends with the recorder
         output = readme_examples.run(

@@ -37,5 +37,5 @@ def test_correction_brings_the_sensor_closer(name):
 
 
 def test_readme_shows_these_figures():
-    shown = readme_examples.RECORDS.search(readme_examples.README.read_text("utf-8"))[2]
+    shown = readme_examples.RECORDS.search(readme_examples.RECORDS_PAGE.read_text("utf-8"))[2]
     assert readme_examples.same(shown, real_records.table())

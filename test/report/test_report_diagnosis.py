@@ -21,7 +21,7 @@ from frac_accel.diagnosis.experiments import separating_experiment
 from frac_accel.io.bag import RAW_TOPIC
 from frac_accel.model.effects import known_effects
 from frac_accel.report.diagnosis import diagnosis_page
-from frac_accel.report.quantity import rounded
+from frac_accel.report.quantity import written
 
 pytestmark = pytest.mark.long
 
@@ -67,8 +67,8 @@ def test_page_tells_what_was_found(explained):
     for finding in said["findings"]:
         cause, gain = finding["cause"], finding["gain"]
         for name, entry in finding["parameters"].items():
-            value, std = rounded(entry["value"], entry["std"])
-            assert re.search(rf"{cause} {name} {re.escape(value)} {re.escape(std)} ", text)
+            assert written(entry["value"], entry["std"], entry["unit"]) in text
+            assert re.search(rf"{cause} {name} [\d.e-]+ [\d.e-]+ ", text)
         assert f"{gain['reduction']:.2%}" in text
         assert f"{gain['ci95'][0]:.2%} to {gain['ci95'][1]:.2%}" in text
         assert finding["explanation"] in text and known_effects()[cause].experiment in text

@@ -15,7 +15,7 @@ from frac_accel.errors import ModelError
 from frac_accel.identification import Identification
 from frac_accel.record import Record
 from frac_accel.report.identification import identification_page
-from frac_accel.report.quantity import percent, rounded
+from frac_accel.report.quantity import percent, rounded, scaled, written
 from frac_accel.uncertainty import response_uncertainty
 
 BAG = Path(__file__).resolve().parents[2] / "bags" / "viscoelastic_bench.mcap"
@@ -46,9 +46,10 @@ def test_page_tells_what_was_found(tmp_path, structure):
     found = json.loads(Path(files["r.json"]).read_text())
     text = Path(files["r.html"]).read_text()
     for name, entry in found["parameters"].items():
-        value, std = rounded(entry["value"], entry["std"])
+        factor, unit = scaled(entry["value"], entry["unit"])
+        value, std = rounded(factor * entry["value"], factor * entry["std"])
         assert re.search(rf"<td[^>]*>{name}</td><td[^>]*>{re.escape(value)}</td>"
-                         rf"<td[^>]*>{re.escape(std or '–')}</td>", text)
+                         rf"<td[^>]*>{re.escape(std or '–')}</td>.*<td[^>]*>{unit or 1}</td>", text)
     assert found["reason"] in text
     tests, excited = found["validation"]["residual"], found["excitation"]
     assert f"{tests['independence_statistic']:.1f}" in text
@@ -86,6 +87,19 @@ def test_report_that_cannot_be_written_is_refused_before_the_work(tmp_path, caps
     (0.0, 0.0, ("0", "")), (3.25, float("nan"), ("3.25", "")), (-2.5, 12.0, ("-2", "12"))])
 def test_values_end_where_their_uncertainty_begins(value, std, expected):
     assert rounded(value, std) == expected
+
+
+@pytest.mark.parametrize("value, std, unit, expected", [
+    (0.00129994, 1.1e-7, "s", "1.29994 ms ± 0.11 µs"),
+    (0.000600059, 2.4e-7, "s", "600.06 ± 0.24 µs"),
+    (180.003265, 0.0094, "Hz", "180.0033 Hz ± 9.4 mHz"),
+    (0.9999999999, 1e-4, "s", "1.00000 s ± 0.10 ms"), (1500.0, 2.0, "Hz", "1.5000 kHz ± 2.0 Hz"),
+    (-0.0021, 0.00005, "s", "-2.100 ms ± 50 µs"), (1e-5, 0.002, "s", "0.0 ± 2.0 ms"),
+    (1.02, 0.003, "1", "1.0200 ± 0.0030"), (0.02, 0.0, "s", "20 ms"), (0.0, 0.0, "s", "0 s"),
+    (3.25, float("nan"), "s", "3.25 s"), ("bessel", 0.0, "", "bessel"),
+    (0.02, 0.003, "1/m^2", "0.0200 ± 0.0030 1/m²")])
+def test_values_are_written_with_prefixes(value, std, unit, expected):
+    assert written(value, std, unit) == expected
 
 
 def test_percent():

@@ -110,9 +110,9 @@ class ArxFit(Fit):
         orders = self.orders
         stamps = f" and the {self.lag_s:.3g} s by which the sensor's stamps are later than the " \
                  "reference's" if abs(self.lag_s) * self.sampling_rate_hz > 1e-3 else ""
-        pairs = [f"{pair['natural_frequency_hz']['value']:.5g} +- "
+        pairs = [f"{pair['natural_frequency_hz']['value']:.5g} ± "
                  f"{pair['natural_frequency_hz']['std']:.2g} Hz with damping ratio "
-                 f"{pair['damping_ratio']['value']:.4g} +- {pair['damping_ratio']['std']:.2g}"
+                 f"{pair['damping_ratio']['value']:.4g} ± {pair['damping_ratio']['std']:.2g}"
                  for pair in self.continuous_equivalent()["poles"]]
         return [
             f"{orders.poles} pole(s) and {orders.inputs} numerator coefficient(s), chosen by BIC "

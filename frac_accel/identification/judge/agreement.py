@@ -30,8 +30,8 @@ def compare_domains(fit, other):
     worst = max(differences, key=differences.get)
     place = other.names.index(worst)
     agrees = bool(differences[worst] <= _DISAGREE)
-    values = (f"{worst} {fit[worst]:.6g} +- {std[worst]:.2g} in the time domain, "
-              f"{other[worst]:.6g} +- {other.std[place]:.2g} in the frequency domain, "
+    values = (f"{worst} {fit[worst]:.6g} ± {std[worst]:.2g} in the time domain, "
+              f"{other[worst]:.6g} ± {other.std[place]:.2g} in the frequency domain, "
               f"{differences[worst]:.1f} combined standard uncertainties apart")
     return {
         "parameters": {name: {"value": float(value), "std": float(spread)}

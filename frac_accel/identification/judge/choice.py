@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from ...errors import FracAccelError, IdentificationError
+from ...errors import FracAccelError, IdentificationError, naming
 from ..fit.structures import OscillatorStructure
 from ..fit.uncertainty import SIGNIFICANT
 from ..response.excitation import excited_band
@@ -77,7 +77,7 @@ def flat_instead(data):
                "its parameters are open, and a gain is all that can be said")
     else:
         return None
-    place = f"at {resonance:.4g} +- {std:.2g} Hz" if std < resonance else "at any frequency above"
+    place = f"at {resonance:.4g} ± {std:.2g} Hz" if std < resonance else "at any frequency above"
     return flat, (f"no resonance shows up to {highest:.4g} Hz: an oscillator {place} {why} "
                   f"(held-out residual "
                   f"{classical.held_out_nrmse:.3%} against {flat.held_out_nrmse:.3%})")
@@ -124,7 +124,7 @@ def _preferred(classical, fractional, datas, judged):
     """The better of two candidates of the same records, and why."""
     order = fractional.fit["damping_order"]
     std = fractional.fit.std[fractional.fit.names.index("damping_order")]
-    score = f"damping order {order:.4g} +- {std:.2g}"
+    score = f"damping order {order:.4g} ± {std:.2g}"
     held_out = (f"{judged} {fractional.held_out_nrmse:.3%} against "
                 f"{classical.held_out_nrmse:.3%} of the classical model")
     if abs(order - 1) <= SIGNIFICANT * std:
@@ -153,10 +153,14 @@ def _explains(classical, fractional, datas):
 
 def _combined(name, datas, records):
     """Candidate of all records together and their RecordAgreement."""
-    structure, first = fitted(name, datas[0])
+    with naming(records[0]):
+        structure, first = fitted(name, datas[0])
     # the orders of a transfer function must be the same in all
-    start = first.unknowns if name == "arx" else None
-    fits = [first, *(fit_of(structure, data, start) for data in datas[1:])]
+    start, fits = first.unknowns if name == "arx" else None, [first]
+    for record, data in zip(records[1:], datas[1:]):
+        data.progress(f"fitting the {name} structure to {record}")
+        with naming(record):
+            fits.append(fit_of(structure, data, start))
     datas[0].progress(f"judging the {name} structure on the other records")
     table = [[data.predicted(structure, fit, _settled(structure, fit, data)) for data in datas]
              for fit in fits]

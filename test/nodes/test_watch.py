@@ -1,0 +1,151 @@
+"""`frac_accel watch` in a pseudo-terminal: what it shows of a live corrector, and how it ends."""
+
+import contextlib
+import fcntl
+import math
+import os
+import pty
+import re
+import select
+import shutil
+import struct
+import subprocess
+import sys
+import termios
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+pytest.importorskip("rich")
+
+from ros_probe import Probe, background, publish
+from ros_processes import ROOT, NodeProcess, ros_domain
+from sensor_msgs.msg import Imu
+from test_node_sensors import (
+    RATE_HZ,
+    expected,
+    parameters_file,
+    reliable,
+    samples,
+    write_model,
+)
+
+from frac_accel.commands.watch import sparkline, table
+from frac_accel.io import cdr
+from frac_accel.nodes._watcher import Seen
+
+pytestmark = pytest.mark.ros
+
+LEAVES_SCREEN = "\x1b[?1049l"
+
+
+class Terminal:
+    """The command in a terminal of its own, 150 columns wide."""
+
+    def __init__(self, environment, *arguments):
+        self.ours, theirs = pty.openpty()
+        fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("4H", 30, 150, 0, 0))
+        self.theirs, self.before, self.text = theirs, termios.tcgetattr(theirs), ""
+        # so that Ctrl-C reaches it as from a keyboard
+        session = ["setsid", "--ctty", "--wait"] if shutil.which("setsid") else []
+        self.process = subprocess.Popen(
+            [*session, sys.executable, "-m", "frac_accel.cli", "watch", *arguments],
+            stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=not session,
+            env={**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm-256color", **environment})
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        os.close(self.ours)
+        os.close(self.theirs)
+
+    def read(self, seconds):
+        """Take in what has been drawn."""
+        end_s = time.monotonic() + seconds
+        while (left_s := end_s - time.monotonic()) > 0:
+            if select.select([self.ours], [], [], left_s)[0]:
+                with contextlib.suppress(OSError):
+                    self.text += os.read(self.ours, 65536).decode(errors="replace")
+
+    def until(self, pattern, seconds=30.0):
+        """Match of a pattern in the newest picture; waits for it."""
+        end_s = time.monotonic() + seconds
+        while time.monotonic() < end_s:
+            self.read(0.2)
+            picture = self.text.rpartition("\x1b[H")[2]
+            plain = re.sub(r"\x1b\[[?0-9;]*[A-Za-z]", "", picture)
+            if found := re.search(pattern, plain):
+                return found
+        raise AssertionError(f"no {pattern!r} in {plain}")
+
+    def end(self, key):
+        """Press a key; exit status, and whether the terminal is as it was."""
+        os.write(self.ours, key)
+        for _ in range(50):
+            self.read(0.1)
+            if self.process.poll() is not None:
+                break
+        return self.process.poll(), (LEAVES_SCREEN in self.text
+                                     and termios.tcgetattr(self.theirs) == self.before)
+
+
+def test_it_shows_what_the_corrector_says_and_quits_cleanly(tmp_path):
+    model, raw = write_model(tmp_path / "soft.yaml", 10.0), samples(3, seconds=20.0)
+    messages = cdr.encode_samples(cdr.IMU, raw)
+    with ros_domain() as environment, Probe(environment) as probe, NodeProcess(
+            "corrector", environment, {}, *parameters_file(
+                tmp_path, model_file=str(model), sample_rate_hz=RATE_HZ,
+                qos_overrides=reliable("/imu/data_raw"))), \
+            Terminal(environment) as shown, Terminal(environment, "rear") as other:
+        publisher = probe.publisher(Imu, "/imu/data_raw")
+        with background(publish, [(publisher, messages)], RATE_HZ):
+            # once two seconds of it are in the window
+            probe.until(lambda: probe.statuses, "no status")
+            shown.read(6.0)
+            row = shown.until(r"/imu/data_raw *│ *([\d.]+) │ ([▁-█]+) *│ *([\d.]+) │ [▁-█]+ *│"
+                              r" *([\d.]+) │ *([\d.]+) ms │ *(\w+)")
+            # the vector's RMS, before and after a sensitivity of 10
+            size = math.hypot(*np.std(raw.values, axis=0))
+            after = math.hypot(*np.std(expected(model, raw).values, axis=0))
+            assert float(row[1]) == pytest.approx(size, rel=0.15)
+            assert float(row[3]) == pytest.approx(after, rel=0.15)
+            assert len(row[2]) >= 3
+            assert float(row[4]) == pytest.approx(RATE_HZ, rel=0.2)
+            assert float(row[5]) < 1000
+            status = probe.statuses[-1].message
+            assert status.split()[0] == row[6]
+            other.until("waiting for a corrector")
+            assert other.end(b"\x03") == (0, True)
+        assert shown.end(b"q") == (0, True)
+        assert "Traceback" not in shown.text + other.text
+
+
+def test_without_a_terminal_it_says_what_to_do():
+    result = subprocess.run([sys.executable, "-m", "frac_accel.cli", "watch"], cwd=ROOT,
+                            capture_output=True, text=True)
+    line, = result.stderr.splitlines()
+    assert result.returncode == 2 and "draws in a terminal" in line
+
+
+def test_a_silent_corrector_and_missing_figures_are_said():
+    from rich.console import Console
+    sensor = Seen("/front/imu/data_raw", 60)
+    sensor.verdict, sensor.heard_s = "all is well", 100.0
+    sensor.take({"x/raw/std": 3.0, "y/raw/std": 4.0, "received_per_s": 99.6})
+    for now_s, words in ((101.0, "all is well"), (160.0, "silent for 60 s")):
+        console = Console(width=140, record=True, file=open(os.devnull, "w"))
+        console.print(table([sensor], now_s, 140))
+        text = console.export_text()
+        assert words in text and " 5 " in text and "99.6" in text and "–" in text
+
+
+@pytest.mark.parametrize("values, bars", [
+    ([], ""), ([0.0, 0.0], "▁▁"), ([1.0, 1.0], "██"), ([math.nan, 2.0, 1.0], " █▅")])
+def test_sparkline(values, bars):
+    assert sparkline(values) == bars
