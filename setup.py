@@ -45,7 +45,11 @@ setup(
         "plotly>=5.13",
         "numba>=0.57",  # simulation of nonlinear springs and friction
     ],
-    extras_require={"bench": ["PyDynamic>=2.4"]},  # what `frac_accel bench` compares with
+    extras_require={
+        "bench": ["PyDynamic>=2.4"],  # what `frac_accel bench` compares with
+        # `frac_accel fleet`: rows in Parquet, object stores, clusters (--scheduler)
+        "fleet": ["pyarrow>=14", "fsspec>=2023.10", "distributed>=2023.10"],
+    },
     entry_points={
         "console_scripts": [
             "frac_accel = frac_accel.cli:main",

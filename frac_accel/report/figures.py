@@ -309,6 +309,25 @@ def lines(x, series, x_label, y_label, band=None, points=None, log=""):
     return figure
 
 
+def by_date(points):
+    """Errors of many bags by date, a colour for each verdict.
+
+    Parameters
+    ----------
+    points : list of dict
+        ``start_ns``, ``nrmse``, ``verdict``, ``bag``; and ``page``, which a click opens, or None.
+    """
+    figure = _rows(1, 420, "date", ["error / output"], x_type="date")
+    figure.update_yaxes(type="log", tickformat=".2~%")
+    for colour, verdict in zip(SERIES, sorted({str(point["verdict"]) for point in points})):
+        mine = [point for point in points if str(point["verdict"]) == verdict]
+        _add(figure, 1, mode="markers", name=verdict.replace("_", " "), marker={"color": colour},
+             x=[np.datetime64(point["start_ns"], "ns").astype(str) for point in mine],
+             y=[point["nrmse"] for point in mine], text=[point["bag"] for point in mine],
+             customdata=[point["page"] or "" for point in mine])
+    return figure
+
+
 def _rows(rows, height, x_label, y_labels, weights=None, x_type="linear"):
     """Empty figure of panels above each other on a common axis."""
     require_plotly()
