@@ -14,6 +14,7 @@ from ..errors import FracAccelError
 from ..identification.fit.uncertainty import by_blocks, sandwich
 from ..model.effects import known_effects
 from ..model.parameters import parameter_fields
+from .problem import acts_on_spring
 
 # Share of a column's power that must be left beside what every fit takes.
 _OWN = 1e-6
@@ -105,6 +106,9 @@ def screen_of(engine):
                 change = engine.problem.change(fitted.effects, cause, effect)[used]
             except FracAccelError:
                 continue
+            if acts_on_spring(effect):
+                # its first order leaves open the level that a force has had before the record
+                change = change - change.mean()
             own = change - taken @ (taken.T @ change)
             power = own @ own
             # of several sizes the smallest is the nearest to first order
