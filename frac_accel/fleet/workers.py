@@ -210,13 +210,13 @@ class Cluster:
 
     def _require_same(self, client):
         versions = client.run(package_version, on_error="return")
-        ours = package_version()
+        mine = ours()
         others = sorted({version if isinstance(version, str) else "none that can be imported"
-                         for version in versions.values()} - {ours})
+                         for version in versions.values()} - {mine})
         if others:
             client.close()
             raise FracAccelError(f"{self._address}: its workers have frac_accel "
-                                 f"{', '.join(others)}, this is {ours}")
+                                 f"{', '.join(others)}, this is {mine}")
 
 
 class Named:
@@ -257,6 +257,11 @@ class Named:
 
 def _key(entry):
     return entry["bag"], entry.get("axis", "")
+
+
+def ours():
+    """Version of the package that this process runs."""
+    return package_version()
 
 
 def package_version():
