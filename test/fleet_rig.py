@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-
 from rig import Sensor, band_noise, simulate_record
 
 RATE_HZ = 500.0

@@ -11,6 +11,7 @@ import contextlib
 import ctypes
 import importlib
 import multiprocessing
+import os
 import signal
 import time
 from concurrent.futures.process import BrokenProcessPool
@@ -106,10 +107,11 @@ class LocalCores:
 
     def _pool(self, count):
         return concurrent.futures.ProcessPoolExecutor(
-            count, multiprocessing.get_context("spawn"), _begin, (self._memory_mb,))
+            count, multiprocessing.get_context("spawn"), _begin,
+            (self._memory_mb, os.getpid()))
 
 
-def _begin(memory_mb):
+def _begin(memory_mb, parent):
     """Prepare a process: it is stopped by its parent alone, with it, and has its bounds."""
     import resource
 
@@ -118,6 +120,8 @@ def _begin(memory_mb):
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)  # it died before
     limit = int(memory_mb * 1e6)
     resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
 

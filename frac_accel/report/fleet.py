@@ -36,8 +36,9 @@ def fleet_page(seen, command=""):
     points = [entry for entry in seen.bag_list
               if entry["nrmse"] is not None and entry["start_ns"] is not None]
     if points:
-        glance.figure(figures.by_date(points), "Error of the model in use in each bag, over its standard "
-                      "deviation; a click on a point opens the bag's page, where there is one.")
+        glance.figure(figures.by_date(points),
+                      "Error of the model in use in each bag, over the standard deviation of its "
+                      "output; a click on a point opens the bag's page, where there is one.")
     _together(page, seen)
     _bags(page, seen)
     if seen.failed:

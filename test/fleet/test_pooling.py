@@ -1,10 +1,10 @@
 """A fleet finds what no single bag shows, and next to nothing that is not there."""
 
+import fleet_rig
 import numpy as np
 import pytest
 from scipy.stats import false_discovery_control
 
-import fleet_rig
 from frac_accel.fleet.false_discoveries import discoveries
 from frac_accel.fleet.groups import ALL, groups_of
 from frac_accel.fleet.pooled import Estimates, common_causes, odd_vehicles, weak_effects
@@ -24,7 +24,7 @@ def test_the_mean_of_a_group_lies_in_its_interval(spread):
         pooled = pool(values, stds)
         inside += pooled.low <= 1.7 <= pooled.high
         found.append(pooled.spread)
-    # three standard errors of a share below 95 %; the factor that is not below one makes it cover more
+    # three standard errors of a share below 95 %; the factor not below one makes it cover more
     assert inside / draws > 0.95 - 3 * np.sqrt(0.05 * 0.95 / draws)
     assert np.median(found) == pytest.approx(spread, rel=0.2, abs=0.4)
 
@@ -55,8 +55,8 @@ def fleet():
     model = SensorModel.from_dict(fleet_rig.model())
     rng = np.random.default_rng(17)
     causes = ["cubic_stiffness", "sensitivity_error", "gain_drift"]
-    return [fleet_rig.ScreenedVehicle(fleet_rig.vehicle(rng, causes if i < WEAK else (), 3.0), model)
-            for i in range(VEHICLES)]
+    vehicles = [fleet_rig.vehicle(rng, causes if i < WEAK else (), 3.0) for i in range(VEHICLES)]
+    return [fleet_rig.ScreenedVehicle(own, model) for own in vehicles]
 
 
 def lots(seed):
