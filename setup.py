@@ -54,6 +54,7 @@ setup(
         "console_scripts": [
             "frac_accel = frac_accel.cli:main",
             "corrector = frac_accel.nodes.corrector:main",
+            "diagnoser = frac_accel.nodes.diagnoser:main",
             "player = frac_accel.nodes.player:main",
             "recorder = frac_accel.nodes.recorder:main",
             "virtual_sensor = frac_accel.nodes.virtual_sensor:main",

@@ -9,8 +9,8 @@ import dataclasses
 
 import numpy as np
 
-from ..errors import FracAccelError
 from ..diagnosis.problem import Problem
+from ..errors import FracAccelError
 from ..model import AXES
 from ..record import Record
 
