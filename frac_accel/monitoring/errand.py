@@ -14,18 +14,18 @@ _HEAD_START_S = 1.0
 _TICKS = os.sysconf("SC_CLK_TCK")
 
 
-# What the new process does first: it runs only where nobody else wants to, and ends with its parent
-# (prctl 1), be it stopped or not. Not in a preexec_fn, which is not safe beside threads.
+# What the new process does first: it steps back, and ends with its parent (prctl 1), be it stopped
+# or not. Not in a preexec_fn, which is not safe beside threads; and not with SCHED_IDLE, by which it
+# would never end on a busy machine.
 _HUMBLE = """
 import ctypes, os, signal, sys
-os.nice(19)
+os.nice(int(sys.argv[2]))
 try:
-    os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)
 except (AttributeError, OSError):
     pass
 if os.getppid() == int(sys.argv[1]):
-    os.execv(sys.argv[2], sys.argv[2:])
+    os.execv(sys.argv[3], sys.argv[3:])
 """
 
 
@@ -43,6 +43,8 @@ class Errand:
         Share of one core.
     time_limit_s : float
         Processor time after which the search ends [s].
+    niceness : int
+        Of the process: 19 steps back behind everything else.
 
     Attributes
     ----------
@@ -51,7 +53,7 @@ class Errand:
         Processor time so far [s].
     """
 
-    def __init__(self, folder, pair, model_file, axis, budget, time_limit_s):
+    def __init__(self, folder, pair, model_file, axis, budget, time_limit_s, niceness=19):
         self.folder, self._budget = folder, budget
         self.cpu_s, self._is_stopped, self._begin_s = 0.0, False, time.monotonic()
         bag = folder / "stretch.mcap"
@@ -64,8 +66,9 @@ class Errand:
                        "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
         with open(folder / "errors.txt", "wb") as errors:
             self._process = subprocess.Popen(
-                [sys.executable, "-S", "-c", _HUMBLE, str(os.getpid()), *command], env=environment,
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors)
+                [sys.executable, "-S", "-c", _HUMBLE, str(os.getpid()), str(niceness),
+                 *command], env=environment, stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL, stderr=errors)
 
     def turn(self):
         """Stop it or let it go on, several times a second; the result once there is one.

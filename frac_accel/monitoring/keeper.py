@@ -30,9 +30,9 @@ class Keeper:
     axis : {"x", "y", "z"}
     apply : str
         One of `APPLY`.
-    limit_mb, budget, time_limit_s, every_s, false_alarm_h : float
-        Of the folder, of the processor (share of a core), of a diagnosis, of diagnoses without an
-        alarm (0: none), and between false alarms.
+    limit_mb, budget, time_limit_s, niceness, every_s, false_alarm_h : float
+        Of the folder, of the processor (share of a core), of a diagnosis and its process, of
+        diagnoses without an alarm (0: none), and between false alarms.
     give : callable
         Called with a model file that the corrector is to use; returns once that has been asked
         for. The answer comes by `given`.
@@ -48,11 +48,12 @@ class Keeper:
     """
 
     def __init__(self, model_file, folder, axis, apply, give, *, limit_mb=500.0, budget=0.05,
-                 time_limit_s=60.0, every_s=0.0, false_alarm_h=1000.0):
+                 time_limit_s=60.0, niceness=19, every_s=0.0, false_alarm_h=1000.0):
         if apply not in APPLY:
             raise FracAccelError(f"apply: {apply!r} given, expected {' or '.join(APPLY)}")
         self._axis, self._apply, self._give = axis, apply, give
-        self._budget, self._time_limit_s, self._every_s = budget, time_limit_s, every_s
+        self._budget, self._every_s = budget, every_s
+        self._limits = time_limit_s, niceness
         self.journal = Journal(folder, limit_mb)
         self.model_file = str(Path(model_file).resolve())
         self.watch = Watch(SensorModel.load(model_file), axis, false_alarm_h)
@@ -110,7 +111,7 @@ class Keeper:
         folder = self.journal.begin()
         try:
             self._errand = Errand(folder, pair, self.model_file, self._axis, self._budget,
-                                  self._time_limit_s)
+                                  *self._limits)
         except (OSError, FracAccelError) as error:
             return f"no diagnosis: {error}"
         self._note("diagnosing", reason=reason, stretch_ns=[int(pair[1].stamps_ns[0]),

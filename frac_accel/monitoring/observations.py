@@ -8,6 +8,7 @@ import collections
 import dataclasses
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from ..model import AXES
 from ..record.lattice import lattice_step
@@ -30,6 +31,7 @@ _OFF = 0.3
 _PEAK = 10.0
 _STAYS = 0.03
 _SEGMENT = 1024
+_LINE = 5  # frequencies
 _FEWEST = 512
 
 
@@ -127,10 +129,9 @@ def _figures(values, rate):
 
 def _peak(frequency, density):
     """Frequency of the peak that stands highest above the spectrum around it, or NaN."""
-    level = np.log(np.maximum(density, 1e-300))
-    width = max(len(level) // 8, 3)
-    around = np.array([np.median(level[max(i - width, 0):i + width + 1])
-                       for i in range(len(level))])
+    # a line, such as of an engine, is no resonance: it is narrower than the median's window
+    level = median_filter(np.log(np.maximum(density, 1e-300)), _LINE)
+    around = median_filter(level, max(len(level) // 4, 3))
     inner = slice(2, -2)
     place = 2 + int(np.argmax((level - around)[inner]))
     return float(frequency[place]) if np.exp(level[place] - around[place]) > _PEAK else np.nan

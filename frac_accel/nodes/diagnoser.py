@@ -51,6 +51,9 @@ class Diagnoser(FracAccelNode):
             "time_limit_s": self.declare(
                 "time_limit_s", 60.0, "processor time after which a diagnosis ends",
                 minimum=1.0, maximum=3600.0),
+            "niceness": self.declare(
+                "niceness", 19, "of the process of a diagnosis: 19 steps back behind all others",
+                minimum=0, maximum=19),
             "every_s": self.declare(
                 "every_s", 0.0, "time between diagnoses without an alarm; 0: none", minimum=0.0,
                 maximum=1e7),

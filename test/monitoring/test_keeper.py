@@ -43,7 +43,7 @@ def made(folder, **wishes):
     (folder / "model.yaml").write_text(json.dumps(MODEL))
     given = []
     keeper = Keeper(folder / "model.yaml", folder / "results", "x", "confirmed", given.append,
-                    false_alarm_h=1.0, budget=1.0, **wishes)
+                    false_alarm_h=1.0, budget=1.0, niceness=0, **wishes)
     return keeper, given
 
 
@@ -122,9 +122,9 @@ def observed(observer, rng, gain=1.0, noise=0.05, low_hz=60.0, step=None, still=
     time_s = np.arange(n) / rate
     values = rng.normal(size=(n, 3)) * noise
     from scipy.signal import lfilter
-    pole = 0.985 * np.exp(2j * np.pi * low_hz / rate)
+    pole = 0.96 * np.exp(2j * np.pi * low_hz / rate)
     ringing = lfilter([1.0], np.real(np.poly([pole, pole.conj()])), rng.normal(size=(n, 3)), axis=0)
-    values += 0.03 * ringing + np.sin(2 * np.pi * 1.3 * time_s)[:, None]
+    values += 0.1 * ringing + np.sin(2 * np.pi * 1.3 * time_s)[:, None]
     if still is not None:
         values = rng.normal(size=(n, 3)) * 1e-3 + still
     if step is not None:
