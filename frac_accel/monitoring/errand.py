@@ -15,8 +15,8 @@ _TICKS = os.sysconf("SC_CLK_TCK")
 
 
 # What the new process does first: it steps back, and ends with its parent (prctl 1), be it stopped
-# or not. Not in a preexec_fn, which is not safe beside threads; and not with SCHED_IDLE, by which it
-# would never end on a busy machine.
+# or not. Not in a preexec_fn, which is not safe beside threads; and not with SCHED_IDLE, by which
+# it would never end on a busy machine.
 _HUMBLE = """
 import ctypes, os, signal, sys
 os.nice(int(sys.argv[2]))

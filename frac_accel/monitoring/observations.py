@@ -31,7 +31,7 @@ _OFF = 0.3
 _PEAK = 10.0
 _STAYS = 0.03
 _SEGMENT = 1024
-_LINE = 5  # frequencies
+_LINE = 9  # frequencies
 _FEWEST = 512
 
 
@@ -132,8 +132,8 @@ def _peak(frequency, density):
     # a line, such as of an engine, is no resonance: it is narrower than the median's window
     level = median_filter(np.log(np.maximum(density, 1e-300)), _LINE)
     around = median_filter(level, max(len(level) // 4, 3))
-    inner = slice(2, -2)
-    place = 2 + int(np.argmax((level - around)[inner]))
+    inner = slice(_LINE, -_LINE)
+    place = _LINE + int(np.argmax((level - around)[inner]))
     return float(frequency[place]) if np.exp(level[place] - around[place]) > _PEAK else np.nan
 
 

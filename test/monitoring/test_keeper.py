@@ -134,7 +134,7 @@ def observed(observer, rng, gain=1.0, noise=0.05, low_hz=60.0, step=None, still=
 
 
 @pytest.mark.parametrize("kind, usual, later", [
-    ("noise", {}, {"noise": 0.5}), ("resonance", {}, {"low_hz": 45.0}),
+    ("noise", {}, {"noise": 2.0}), ("resonance", {}, {"low_hz": 45.0}),
     ("lost bits", {"step": 0.02}, {"step": 0.08}),
     ("offset at standstill", {}, {"still": (0.0, 0.0, 10.9)})])
 def test_without_a_reference_it_says_what_it_sees(kind, usual, later):

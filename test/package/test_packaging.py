@@ -19,7 +19,7 @@ import yaml
 from frac_accel.model import SensorModel
 
 ROOT = Path(__file__).parents[2]
-NODES = ("corrector", "player", "recorder", "virtual_sensor")
+NODES = ("corrector", "diagnoser", "player", "recorder", "virtual_sensor")
 
 
 def run(command, **kwargs):
