@@ -1,7 +1,7 @@
-"""Figures of a fleet: ``make bench-fleet``, or ``python -m fleet_bench PART`` with test/ on the path.
+"""Figures of a fleet: ``make bench-fleet``, or ``python -m fleet_bench PART`` beside test/.
 
-``pooling``: how often an effect at a quarter of what a bag can show is found in its lot, and what is
-found that is not there. ``workers``: bags with workers killed at random, time and memory.
+``pooling``: how often an effect at a quarter of what a bag can show is found in its lot, and what
+is found that is not there. ``workers``: bags with workers killed at random, time and memory.
 """
 
 import argparse
@@ -49,8 +49,8 @@ def pooling(vehicles, weak, draws):
         discoveries += len(effects)
         odd += len(odd_vehicles(rest, list(range(vehicles))))
         print(f"{cause}: {[(e.group, e.cause, e.confusable_with) for e in effects]}", flush=True)
-    print(f"{draws} draws, {weak} of {vehicles} vehicles: in {found} found in its lot, in {named} as "
-          f"the first cause; {wrong} of {discoveries} discoveries false; {odd} vehicles odd")
+    print(f"{draws} draws, {weak} of {vehicles} vehicles: in {found} found in its lot, in {named} "
+          f"as the first cause; {wrong} of {discoveries} discoveries false; {odd} vehicles odd")
 
 
 def workers(count):

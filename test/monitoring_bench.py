@@ -1,7 +1,7 @@
-"""Figures of the diagnoser: ``python -m monitoring_bench PART`` with test/ on the path.
+"""Figures of the diagnoser: ``python -m monitoring_bench PART`` beside test/.
 
-``drives``: ten causes that begin on the way, at once and slowly: noticed, dated, named. ``healthy``:
-hours of driving in which nothing happens.
+``drives``: ten causes that begin on the way, at once and slowly: noticed, dated, named.
+``healthy``: hours of driving in which nothing happens.
 """
 
 import argparse
@@ -19,7 +19,7 @@ EFFECTS = [
     {"cross_axis_sensitivity": {"y": 0.05, "z": 0.03}},
     {"mounting_resonance": {"frequency_hz": 80.0, "damping_ratio": 0.1}},
     {"core_parameter_shift": {"natural_frequency_hz": 40.0, "damping_ratio": 0.4}},
-    {"quantization": {"step": 0.05}}, {"dead_zone": {"half_width": 0.05}},
+    {"quadratic_stiffness": {"alpha2": 3e-3}}, {"dead_zone": {"half_width": 0.05}},
     {"tone_interference": {"frequency_hz": 31.0, "amplitude": 0.1}}]
 
 
@@ -35,11 +35,11 @@ def watched(drive, model):
     return watch, noticed
 
 
-def drives(count):
+def drives(count, first=0):
     """As many drives, the causes in turn; every other time ten slowly."""
     model = SensorModel.from_dict(MODEL)
     totals = dict.fromkeys(("noticed", "dated", "covered", "named", "wrong"), 0)
-    for number in range(count):
+    for number in range(first, first + count):
         effects = EFFECTS[number % len(EFFECTS)]
         ramp_s = 60.0 * (number // len(EFFECTS) % 2)
         at_s = 450.0 + np.random.default_rng(number).uniform(0, 60)
@@ -89,9 +89,10 @@ def main():
     parser = argparse.ArgumentParser(prog="monitoring_bench", description=__doc__)
     parser.add_argument("part", choices=["drives", "healthy"])
     parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--hours", type=float, default=100.0)
     chosen = parser.parse_args()
-    drives(chosen.count) if chosen.part == "drives" else healthy(chosen.hours)
+    drives(chosen.count, chosen.first) if chosen.part == "drives" else healthy(chosen.hours)
 
 
 if __name__ == "__main__":

@@ -12,8 +12,11 @@ import numpy as np
 
 from ..errors import FracAccelError
 from ..identification.fit.uncertainty import by_blocks, sandwich
+from ..model.core.static_force import StaticForce
 from ..model.effects import known_effects
+from ..model.effects.base import CORE
 from ..model.parameters import parameter_fields
+from .first_order import static_force
 from .problem import acts_on_spring
 
 # Share of a column's power that must be left beside what every fit takes.
@@ -104,11 +107,10 @@ def screen_of(engine):
             name, unit, step = _moved(engine.problem, effect)
             try:
                 change = engine.problem.change(fitted.effects, cause, effect)[used]
+                if acts_on_spring(effect):
+                    change = change + _level_before(engine.problem, fitted.effects, effect)
             except FracAccelError:
                 continue
-            if acts_on_spring(effect):
-                # its first order leaves open the level that a force has had before the record
-                change = change - change.mean()
             own = change - taken @ (taken.T @ change)
             power = own @ own
             # of several sizes the smallest is the nearest to first order
@@ -130,6 +132,19 @@ def _independent_of_data(effect_class, view):
     for one, two in zip(effect_class.starts(view), effect_class.starts(other)):
         if one.kind in ("free", "positive", "weak") and one.columns == two.columns:
             yield from one.columns
+
+
+def _level_before(problem, effects, effect):
+    """What the force with which a record begins has always added: its first order begins there."""
+    model = problem.axis_model({name: other for name, other in effects.items()
+                                if not acts_on_spring(other)})
+    core = model.effective_core
+    force = static_force(effect.add_force(StaticForce(core=core)), problem.motion(effects),
+                         problem.rate, core.natural_frequency_hz)
+    at_rest = np.array([1e-9 + 0j])
+    passed = np.prod([link.transfer_function(at_rest)[0].real for link in model.dynamics[1:]
+                      if link.stage > CORE])
+    return -float(force[0]) * passed
 
 
 def _moved(problem, effect):

@@ -9,6 +9,7 @@ from ..io.bag import BagReader
 from ..io.regular_file import open_regular
 from .places import at_hand
 
+# Bytes that are read at a time.
 _PART = 1 << 20
 
 

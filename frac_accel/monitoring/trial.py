@@ -7,7 +7,7 @@ from scipy.special import stdtrit
 _FEWEST = 6
 _MOST = 60
 # One-sided chance that a model that is no better wins at one look; it is looked after each window.
-_CHANCE = 1e-4
+_LUCK = 1e-4
 # Share by which the residual must be smaller.
 _WORTH_IT = 0.01
 
@@ -41,7 +41,7 @@ class Trial:
         if len(ratios) < _FEWEST:
             return
         spread = max(ratios.std(ddof=1), 1e-6) / np.sqrt(len(ratios))
-        reach = stdtrit(len(ratios) - 1, 1 - _CHANCE / _MOST) * spread
+        reach = stdtrit(len(ratios) - 1, 1 - _LUCK / _MOST) * spread
         if ratios.mean() + reach < np.log(1 - _WORTH_IT):
             self.verdict = "won"
         elif ratios.mean() - reach > 0 or len(ratios) >= _MOST:

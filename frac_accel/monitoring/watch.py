@@ -23,6 +23,8 @@ _STRETCHES = 4
 _LONGEST_S = 60.0
 # Share of the usual motion from which on a window counts as well excited.
 _EXCITED = 0.5
+# Time [s] from the onset on that a growing change is given before what it has become is diagnosed.
+_GROWING_S = 120.0
 # Excited time [s] after a change that a diagnosis is given.
 ENOUGH_S = 30.0
 
@@ -175,7 +177,8 @@ class Watch:
         if self.changed.is_gradual:
             # what is there now, rather than what has grown
             newest = self._recent[-1].stop_ns if self._recent else 0
-            return [w for w in self._recent if w.start_ns >= newest - _LONGEST_S * 1e9]
+            first = max(newest - _LONGEST_S * 1e9, self.changed.ns + _GROWING_S * 1e9)
+            return [window for window in self._recent if window.start_ns >= first]
         return [window for window in self._recent if window.start_ns >= self.changed.high_ns]
 
     def to_diagnose(self):

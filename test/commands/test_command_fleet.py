@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from frac_accel.cli import main
+from frac_accel.diagnosis import Diagnosis
 
 pytest.importorskip("pyarrow")
 fsspec = pytest.importorskip("fsspec")
@@ -141,6 +142,9 @@ def test_rows_of_diagnoses_are_what_the_command_says(drives, tmp_path, capsys):
         for name, p in f["parameters"].items()}
     kept = json.loads((tmp_path / "out" / mount["result"]).read_text())
     assert kept["findings"] == one["findings"]
+    screened = Diagnosis.from_dict(kept).screened
+    count = len(screened["estimates"])
+    assert count > 15 and len(screened["correlations"]) == count * (count - 1) // 2
     page = (tmp_path / "out" / "diagnose.html").read_text()
     assert f'href="{mount["page"]}"' in page and (tmp_path / "out" / mount["page"]).exists()
     assert "1 failed" in capsys.readouterr().out

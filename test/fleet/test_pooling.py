@@ -59,6 +59,21 @@ def fleet():
     return [fleet_rig.ScreenedVehicle(own, model) for own in vehicles]
 
 
+def test_first_order_estimates_are_the_parameters_that_the_rig_had():
+    model, size = SensorModel.from_dict(fleet_rig.model()), 2e-3
+    own = fleet_rig.vehicle(np.random.default_rng(6), fleet_rig.CAUSES, 3.0)
+    screened = fleet_rig.ScreenedVehicle(own, model)
+    for cause, parameters in fleet_rig.CAUSES.items():
+        [(name, value)] = parameters(size).items()
+        without = parameters(0.0)[name]
+        before, after = (screened.drawn(np.random.default_rng(1), cause, scale)["estimates"]
+                         for scale in (0.0, size))
+        [change] = [b["value"] - a["value"] for a, b in zip(before, after)
+                    if (a["cause"], a["parameter"]) == (cause, name)]
+        # forces to first order in what the motion is, not in what it becomes
+        assert change == pytest.approx(value - without, rel=0.05), cause
+
+
 def lots(seed):
     """Groups: a lot with the vehicles in which something may be hidden, and columns of chance."""
     rng = np.random.default_rng(seed)
