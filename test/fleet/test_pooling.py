@@ -70,8 +70,9 @@ def test_first_order_estimates_are_the_parameters_that_the_rig_had():
                          for scale in (0.0, size))
         [change] = [b["value"] - a["value"] for a, b in zip(before, after)
                     if (a["cause"], a["parameter"]) == (cause, name)]
-        # forces to first order in what the motion is, not in what it becomes
-        assert change == pytest.approx(value - without, rel=0.05), cause
+        # at 500 Hz the turns of the motion, at which friction changes its sign, lie between samples
+        rel = 0.15 if cause == "coulomb_friction" else 0.02
+        assert change == pytest.approx(value - without, rel=rel), cause
 
 
 def lots(seed):
