@@ -18,7 +18,7 @@ SLOW = """
 MANY_DRAWS = """
     axis_monitors backlash budget changes_in_time corrected_uncertainty core_response
     corrector_uncertainty diagnosis_data_checks diagnosis_exchanged diagnosis_leftover
-    diagnosis_steps domains_agree effects_correction effects_simulation
+    diagnosis_laws diagnosis_steps diagnosis_stretches diagnosis_truthful domains_agree effects_correction effects_simulation
     effects_streaming empirical_link further_forces gap_coverage identify_arx
     identify_auto identify_fractional identify_gain identify_general_equation identify_oscillator
     identify_records inverse_design linear_causes misalignment output_variance plausibility

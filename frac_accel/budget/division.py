@@ -290,6 +290,7 @@ class _One:
             target = self.e - sum(others) if others else self.e.copy()
             target[self.flagged] = 0.0
             self.predicted.pop(part, None)
+            self.kept.pop(part, None)
             made = self._best(part, target)
             if made is not None:
                 self.predicted[part], self.kept[part] = made

@@ -20,8 +20,8 @@ from .noise import _given, _periods, _untrusted
 
 _SEGMENTS = 32
 _LONGEST = 1024
-# Power of the noise, of the reference's, below which it bends nothing that the record could tell,
-# and above which nothing is said.
+# Power of the noise, of the reference's, below which it bends no fit, and above which nothing is
+# said.
 _LEAST, _MOST = 1e-4, 0.1
 # Quantile of the density that white noise cannot exceed, and by how much an estimate may.
 _FLOOR, _SCATTERS = 0.05, 1.3
@@ -34,7 +34,7 @@ _STEADY = 0.5
 # Relative uncertainty at least: no noise is white to better than that.
 _AS_WHITE = 0.02
 # Rest: share of the stretches that may be at rest at least, how much louder than the quietest.
-_STRETCH_S, _STRETCH, _LOUDER, _FEWEST = 0.5, 200, 1.5, 3
+_STRETCH_S, _STRETCH, _STRETCHES, _LOUDER, _FEWEST = 0.5, 200, 20, 1.5, 3
 # Of its signal, the sensor's scatter at rest.
 _RESTS = 0.05
 
@@ -50,6 +50,8 @@ class ReferenceNoise:
     uncertainty : float
         Its standard uncertainty [m/s²].
     by : {"periods", "rest", "covariance", "floor"}
+    bends : bool
+        Whether it is enough to bend a fit; else it counts as noise only.
     frequency_hz, share : tuple of float
         W at some frequencies.
     """
@@ -57,6 +59,7 @@ class ReferenceNoise:
     std: float
     uncertainty: float
     by: str
+    bends: bool
     frequency_hz: tuple
     share: tuple
 
@@ -68,6 +71,10 @@ class ReferenceNoise:
                "floor": "by what it has, evenly, at frequencies where the sensor has none of it"}
         return (f"the reference's own noise is {self.std:.3g} m/s^2 RMS, {how[self.by]}: it counts "
                 "behind a filter that leaves as little of it as possible")
+
+    def density(self, frequency_hz):
+        """Its density [(m/s²)²/Hz] at frequencies up to the Nyquist frequency, the last of them."""
+        return np.full(len(frequency_hz), self.std**2 / frequency_hz[-1])
 
 
 def reference_noise(record, column, used, covariance_std=None):
@@ -93,19 +100,15 @@ def reference_noise(record, column, used, covariance_std=None):
     inner = slice(2, -1)
     power = float(np.var(one))
     lowest = np.quantile(own[inner], _FLOOR)
-    # a floor that most segments do not have is that of a few spikes
-    median = welch(one, rate, nperseg=size, average="median")[1]
-    if np.quantile(median[inner], _FLOOR) < _STEADY * lowest:
-        return None
     most = np.sqrt(lowest * rate / 2)
     for std, by in _estimates(record, column, used, covariance_std, most, size):
-        if std is not None and std <= _SCATTERS * most and _LEAST < std**2 / power < _MOST:
+        if std is not None and std <= _SCATTERS * most and std**2 / power < _MOST:
             share = np.clip(1 - 2 * std**2 / rate / own, 0.0, 1.0)
             # a constant is no noise, and the first line holds what the window leaves of it
             share[:2] = 1.0, share[2]
             count = {"covariance": np.inf, "floor": _WIDE * len(one)}.get(by, len(one) / 4)
             known = max(1 / np.sqrt(2 * count), _AS_WHITE)
-            return ReferenceNoise(float(std), float(known * std), by,
+            return ReferenceNoise(float(std), float(known * std), by, std**2 / power > _LEAST,
                                   tuple(frequency.tolist()), tuple(share.tolist()))
     return None
 
@@ -122,7 +125,7 @@ def _estimates(record, column, used, covariance_std, most, size):
 
 def _at_rest(one, two, used, rate):
     """Scatter of the reference where neither it nor the sensor moves, and they share nothing."""
-    length = max(_STRETCH, int(np.ceil(_STRETCH_S * rate)))
+    length = max(_STRETCH, min(int(np.ceil(_STRETCH_S * rate)), len(one) // _STRETCHES))
     count = len(one) // length
     if count < 2 * _FEWEST:
         return None
@@ -144,6 +147,10 @@ def _floor(one, two, rate, size):
     other, shared = welch(two, rate, nperseg=size)[1], csd(one, two, rate, nperseg=size)[1]
     inner = slice(2, -1)
     own, other, shared = own[inner], other[inner], shared[inner]
+    # one that most segments do not have is that of a few spikes
+    median = welch(one, rate, nperseg=size, average="median")[1][inner]
+    if np.quantile(median, _FLOOR) < _STEADY * np.quantile(own, _FLOOR):
+        return None
     coherence = np.abs(shared)**2 / np.maximum(own * other, 1e-300)
     apart, together = coherence < _SHARED, coherence > 0.9
     if apart.mean() < _WIDE or not together.any():

@@ -11,7 +11,11 @@ from scipy.ndimage import binary_erosion
 from ..budget.reference_noise import reference_noise
 from ..errors import FracAccelError, IdentificationError
 from ..identification.checks.record_checks import moving_samples
-from ..identification.response.excitation import learning_length, require_excitation
+from ..identification.response.excitation import (
+    learning_length,
+    require_excitation,
+    strongest_stretch,
+)
 from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC
 from ..model import AXES, SensorModel
 from ..model.core import Gain, Oscillator
@@ -27,6 +31,7 @@ from .judgement import judge
 from .leftover import related
 from .screened import screened
 from .spikes import spikes
+from .stretches import MOST
 from .time_limit import TimeLimit
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
@@ -100,7 +105,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     column = AXES.index(axis)
     progress("checking the data")
     record = Record.of(*source, axis, temperature)
-    record, source, turned = _in_axes_of_reference(record, source, axis, temperature)
+    record, source, turned = _in_axes_of_reference(record, source, axis, temperature, model)
     found = record.integrity(column)
     found.words.extend(turned)
     if len(record) < _FEWEST:
@@ -109,7 +114,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     found.words.extend(notes)
     used = record.valid & moving
     noise = reference_noise(record, column, used, _stated_noise(source[0], column))
-    if noise:
+    if noise and noise.bends:
         found = dataclasses.replace(found, reference_noise=noise, words=[*found.words, noise.words])
     shown = _shown(found, record.sensor[:, column])
     stray = used & spikes(record.sensor[:, column], record.reference[:, column])
@@ -144,16 +149,22 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
+    engine.reference_noise = noise
     engine.aside = stray | (record.valid & ~moving)
     _require_relation(engine, axis, seed)
     judged = judge(engine, engine.run(seed), found, shown, loose, source[1], noise_std)
     return dataclasses.replace(judged, screened=screened(engine)) if screening else judged
 
 
-def _in_axes_of_reference(record, source, axis, temperature):
+def _in_axes_of_reference(record, source, axis, temperature, model):
     """The record of a sensor whose axis follows another one, turned; its topics, and words."""
     orientation = Orientation.of(record)
-    if orientation is None or not orientation.astray(axis):
+    if orientation is None:
+        return record, source, []
+    if model and orientation.opposes(axis, -1 if _inverts(model.axis(axis)) else 1):
+        return record, source, [f"the sensor's {axis} axis points the other way than the model "
+                                "says, or its polarity is reversed: a gain below zero says that"]
+    if not orientation.astray(axis):
         return record, source, []
     try:
         source = source[0], orientation.turn(source[1])
@@ -164,12 +175,19 @@ def _in_axes_of_reference(record, source, axis, temperature):
                             "its signal turned into the reference's axes"]
 
 
+def _inverts(own):
+    """Whether a model turns slow motion round."""
+    return own.core.sensitivity < 0 if isinstance(own.core, (Gain, Oscillator)) else False
+
+
 def _without_spikes(engine, used, stray, reference):
     """Engine whose fits leave out what stands out of the residual, too; and all that they do."""
     first = engine(used=used)
     # where samples do not count the residual is 0, and steps at their edges are no spikes
-    inside = binary_erosion(first.problem.used, iterations=_EDGE)
-    more = inside & spikes(first.search.fit(first.search.base).residual, reference)
+    p = first.problem
+    inside = binary_erosion(p.used, iterations=_EDGE)
+    more = p.put_back(inside & spikes(first.search.fit(first.search.base).residual,
+                                      p.taken(reference)), np.zeros(len(used), bool))
     return (engine(used=used & ~more) if more.any() else first), stray | more
 
 
@@ -184,6 +202,10 @@ def _classical(record, axis, used, limit):
     """Classical core (a gain where no resonance shows) identified from the record, what it knows
     of it (nothing, since any cause has bent it), and the effects that it was identified with."""
     from ..identification import identify
+    if len(record) > MOST:
+        # all that is found here is fitted anew
+        rows = strongest_stretch(record.reference[:, AXES.index(axis)], MOST)
+        record, used = record.part(rows), used[rows]
     model = identify(dataclasses.replace(record, valid=used), axis, "classical").model
     stds = dict.fromkeys(_CORE, np.inf)
     core, seed = SensorModel(model.core), {effect.cause: effect for effect in model.effects}

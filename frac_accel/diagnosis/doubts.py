@@ -8,10 +8,11 @@ from ..model import is_link
 from ..model.effects.base import CROSS_AXIS, OFFSET
 from .engine import WEIGHS
 from .names import cancelling, undetermined
-from .words import is_accounted
+from .problem import acts_on_spring
+from .words import AS_NOISE, is_accounted
 
 # Times the odd (even) part of what is left, in RMS, that an odd (even) cause must take.
-_LIKE_LAW = 10.0
+_LIKE_LAW = 30.0
 # Logarithm of the size from which a link changes an end of the band, and damping ratio of a pole
 # below which it shows as a resonance.
 _UNDONE = 0.3
@@ -21,6 +22,13 @@ _MOST_OF = 0.5
 # A filter beside which a linear part is left must take this many times its RMS, or it may only
 # resemble the true one; several ones may in any case. Likewise what changes with time.
 _RESEMBLES = 30.0
+# Correlation from which a shift of the core does what a law of force does, and times what is left,
+# in RMS, that the law must then take to be told from others.
+_ALIKE, _TELLS_LAW = 0.8, 5.0
+# Filters that may be one of higher order: so many, or two with poles within such a factor.
+_SEVERAL, _NEAR = 3, 4.0
+# Distance of two filters' product from 1 below which they undo each other.
+_UNDOES = 0.03
 # Standard uncertainties by which a delay below zero is one.
 _ACAUSAL = 3.0
 
@@ -32,6 +40,12 @@ def doubts_about(engine, best, gains, stds, left, noise):
     doubts |= left_open(engine, best, stds, gains)
     takes = {cause: float(np.sqrt(max(g.before**2 - g.after**2, 0.0)))
              for cause, g in gains.items()}
+    own, added = engine.by_reference(best), {cause: engine.added(best, cause) for cause in gains}
+    for cause in gains:
+        rms = min(takes[cause], engine.rms(added[cause]))
+        if rms < AS_NOISE * own:
+            doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) is no more than what the "
+                                     f"reference's own noise makes ({own:.3g} RMS)")
     if min(takes.values(), default=np.inf) < WEIGHS * left.rms:
         unexplained = engine.unexplained(best)
         for cause, rms in takes.items():
@@ -43,12 +57,14 @@ def doubts_about(engine, best, gains, stds, left, noise):
             doubts.setdefault(cause, f"{left.rms / np.std(p.measured[p.used]):.0%} of the output "
                                      "is left, and nothing shows that it is noise")
     for cause, words in {**by_what_is_left(engine, best, takes, left),
-                         **_acausal(engine, best, stds)}.items():
+                         **_acausal(engine, best, stds), **_of_the_model(engine, best)}.items():
         doubts.setdefault(cause, words)
-    for pair in cancelling({cause: engine.added(best, cause) for cause in gains}):
+    for pair in cancelling(added):
         for cause, other in (pair, pair[::-1]):
             doubts.setdefault(cause, f"it nearly cancels {other}: together they may stand for "
                                      "one cause that is not known")
+    for cause, words in _parts_of_a_law(best, takes, added, left).items():
+        doubts.setdefault(cause, words)
     spread = float(np.std(p.measured[p.used]))
     if gains and (left.share > 0 or not is_accounted(engine.rms(best.residual), spread, noise)):
         for cause, words in engine.unstable(best).items():
@@ -68,7 +84,8 @@ def by_what_is_left(engine, fitted, takes, left):
     left : Leftover
     """
     return {**_other_laws(engine, fitted, takes, left), **_elsewhen(engine, fitted, takes, left),
-            **_imitators(engine, fitted, takes, left), **_on_both_sides(engine, fitted)}
+            **_imitators(engine, fitted, takes, left), **_on_both_sides(engine, fitted),
+            **_one_filter(engine, fitted)}
 
 
 def left_open(engine, fitted, stds, causes):
@@ -124,6 +141,44 @@ def _other_laws(engine, best, takes, left):
     return found
 
 
+def _parts_of_a_law(best, takes, added, left):
+    """A shift of the core and a law of force that do nearly the same, the law hardly seen itself.
+
+    A linear and another term are the beginning of any law's series.
+    """
+    found = {}
+    shifts = [cause for cause in takes if best.effects[cause].restates_core]
+    laws = [cause for cause in takes if acts_on_spring(best.effects[cause])]
+    for shift in shifts:
+        for law in laws:
+            one, other = added[shift], added[law]
+            alike = abs(one @ other) / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-300)
+            if alike > _ALIKE and takes[law] < _TELLS_LAW * left.rms:
+                words = (f"{shift} and {law} do nearly the same: together they may be another law "
+                         "of the force")
+                found |= {shift: words, law: words}
+    return found
+
+
+def _one_filter(engine, best):
+    """Filters of the sensor that may be parts of one of higher order, which no cause says."""
+    poles = {cause: np.atleast_1d(effect.poles()) for cause, effect in
+             _filters(engine, best).items()
+             if is_link(effect) and not effect.of_reference and not effect.pure_delay_s()}
+    # what keeps the motion's constant is no low-pass
+    poles = {cause: own for cause, own in poles.items()
+             if len(own) and abs(best.effects[cause].transfer_function(np.array([0j]))[0]) > 0}
+    together = set(poles) if len(poles) >= _SEVERAL else set()
+    for cause, own in poles.items():
+        for other, others in poles.items():
+            apart = np.log(np.abs(own).min() / np.abs(others).min())
+            if cause < other and abs(apart) < np.log(_NEAR) and all(
+                    _is_smooth(best.effects[name]) for name in (cause, other)):
+                together |= {cause, other}
+    return dict.fromkeys(together, "the filters " + ", ".join(sorted(together))
+                         + " may be parts of one of higher order")
+
+
 def _on_both_sides(engine, best):
     """Filters of the sensor and of the reference that undo each other at an end of the band."""
     p = engine.problem
@@ -139,6 +194,22 @@ def _on_both_sides(engine, best):
                 words = (f"{cause} and {other} undo each other in part: one filter of the sensor "
                          "alone, with a zero for the reference's pole, does the same")
                 found |= {cause: words, other: words}
+    return found
+
+
+def _of_the_model(engine, best):
+    """Filters of the reference that undo one of the model in use: to be without that says the
+    same."""
+    p, found = engine.problem, {}
+    s = 2j * np.pi * np.linspace(0, p.rate / 2, 200)[1:]
+    own = [effect for effect in p.baseline.axis(p.axis).effects if is_link(effect)]
+    for cause, effect in _filters(engine, best).items():
+        if effect.of_reference and is_link(effect):
+            response = effect.transfer_function(s)
+            for link in own:
+                if np.max(np.abs(link.transfer_function(s) * response - 1)) < _UNDOES:
+                    found[cause] = (f"it undoes the {link.cause} of the model in use: the sensor "
+                                    "may only lack that")
     return found
 
 

@@ -13,7 +13,6 @@ from ..identification.fit.uncertainty import by_blocks, sandwich
 from ..identification.response.excitation import (
     alternating_stretches,
     learning_length,
-    strongest_stretch,
 )
 from ..model import AxisModel
 from ..model.effects import effect_of
@@ -22,6 +21,7 @@ from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
 from .problem import Problem
 from .search import Search
+from .stretches import Stretches, stretches_of
 
 # Improvement, in variances of one sample's noise and for each parameter, that chance does not give.
 _CHANCE = 30.0
@@ -30,7 +30,7 @@ WEIGHS = 3.0
 # Causes that compete for the place of each one found.
 _RIVALS = 4
 # Records of more samples are searched in part first.
-_LONG = 40_000
+LONG = 40_000
 # A last part with less than this of the motion before it proves little; stretches instead of it.
 _QUIET_END = 0.5
 _STRETCHES = 20
@@ -81,15 +81,20 @@ class Engine:
 
     def __init__(self, record, axis, baseline, used, base=None, candidates=(), log=None, step=None,
                  limit=None):
-        self.problem = Problem(record, axis, baseline, used, limit)
+        slices = stretches_of(record, axis)
+        self.problem = Stretches(record, axis, baseline, used, limit, slices) if slices[1:] else \
+            Problem(record, axis, baseline, used, limit)
         self.part = None
         self.uncontested, self.best = set(), None
         self._step = step
-        self._wanted = used
+        # the record, and its samples that may count: of a very long one, more than are fitted
+        self.record, self.wanted = record, used
         self.search = Search(self.problem, base, candidates, log)
+        # of the reference, where it shows too little to bend a fit: `ReferenceNoise` or None
+        self.reference_noise = None
         # what counts in no fit, since a signal was at fault there
         self.aside = np.zeros(len(record), bool)
-        self.held_out_rows = used & self.problem.used & held_out(record.reference[:, axis])
+        self.held_out_rows = self.problem.used & held_out(self.problem.record.reference[:, axis])
         self._learnt, self._budgets, self._structures = {}, {}, {}
         # what the numerics of the simulation may still be wrong by
         self.floor = 3e-5 * float(np.std(record.sensor[used, axis]))
@@ -119,10 +124,10 @@ class Engine:
         Fitted
         """
         p = self.problem
-        if len(p.record) > _LONG:
+        if len(p.record) > LONG:
             # where the motion is strongest is enough to find most causes, and to judge them
-            rows = strongest_stretch(p.record.reference[:, p.axis], _LONG // 2)
-            self.part = Engine(p.record.part(rows), p.axis, p.baseline, self._wanted[rows],
+            rows = p.strongest(LONG // 2)
+            self.part = Engine(p.part(rows), p.axis, p.baseline, p.taken(self.wanted)[rows],
                                self.search.base, self.search.candidates, self.search.log,
                                self._step, p.limit)
             return self.part.run(seed)
@@ -140,7 +145,12 @@ class Engine:
         self.search.candidates = [cause for cause in self.search.candidates
                                   if effect_of(cause).shows_with_time]
         self.uncontested = self.part.uncontested
-        return self.search.grow([known], self.threshold, self.promises, self.noise_only, _SLOW)
+        best = self.search.grow([known], self.threshold, self.promises, self.noise_only, _SLOW)
+        if best.causes > known.keys() | self.search.base.keys():
+            # what the part has shown may have stood for what only the whole shows
+            best = self.search.prune(best, self.threshold)
+        dated = self.problem.dated(best)
+        return best if dated == best.effects else self.search.again(dated)
 
     def score(self, fitted, variance):
         """Cost with a penalty for each parameter, in units of the noise's variance."""
@@ -210,7 +220,8 @@ class Engine:
                  self.search.screen(rest)[:_RIVALS]
                  if cause not in unwanted and self.promises(rest, cost)]
         found = self.search.varied(next(iter(self.search.fit_all(begun)), rest))
-        return found if rest.cost - found.cost > self.threshold(found) else rest
+        # what was found beside the unwanted has met its rivals beside them only
+        return self.compete(found if rest.cost - found.cost > self.threshold(found) else rest)
 
     def rivals(self, best, cause):
         """Sets without a cause, no larger than the best, by score; (margin, causes)."""
@@ -255,15 +266,19 @@ class Engine:
     def _division(self):
         """Of the record, or where it is long of the part with the strongest motion."""
         p = self.problem
-        self._parted = strongest_stretch(p.record.reference[:, p.axis], _LONG // 2)
+        self._parted = p.strongest(LONG // 2)
         return Division(p.record.reference[self._parted], p.record.valid[self._parted], p.rate,
                         p.axis, quick=True)
 
     def established_noise(self, fitted, stated_std=None):
         """`EstablishedNoise` of the record, beside a fit."""
         p = self.problem
-        return established_noise(fitted.residual, p.measured, p.record.reference, p.used, p.rate,
-                                 p.record.sensor_std, stated_std, None, self._division.period)
+        period = self._division.period
+        # what repeats does so without gaps only
+        rows = p.coherent if period else slice(None)
+        return established_noise(fitted.residual[rows], p.measured[rows], p.record.reference[rows],
+                                 p.used[rows], p.rate, p.record.sensor_std, stated_std, None,
+                                 period)
 
     def by_reference(self, fitted):
         """RMS [output units] of what a fit leaves because the reference does not show it."""
@@ -272,8 +287,17 @@ class Engine:
         model = p.axis_model(fitted.effects)
         sensor = AxisModel(model.core, tuple(e for e in model.effects if not e.of_reference))
         density = sum(e.unknown_density(frequency) for e in model.effects if e.of_reference)
+        if self.reference_noise and not self.reference_noise.bends:
+            density = density + self.reference_noise.density(frequency)
         gain = np.abs(sensor.transfer_function(2j * np.pi * frequency))
         return float(np.sqrt(np.mean(gain**2 * density) * p.rate / 2))
+
+    def _passed_on(self, fitted):
+        """Share of a residual's power by noise of the reference that the model passes on, so that
+        what is left follows it; none where the reference counts behind a filter of that noise."""
+        if not self.reference_noise or self.reference_noise.bends:
+            return 0.0
+        return (self.by_reference(fitted) / max(self.rms(fitted.residual), 1e-300))**2
 
     def budget(self, fitted):
         """`Budget` of what a fit leaves, of all samples that are there."""
@@ -302,8 +326,9 @@ class Engine:
                 rounded = {entry["part"]: SCATTER * entry["share"] for entry in self._division.of(
                     *(values[self._parted] for values in
                       (error, fitted.output + error, fitted.output))).parts}
-            shares = [(entry["share"] - rounded.get(entry["part"], 0.0),
-                       entry["ci95"][0] - rounded.get(entry["part"], 0.0), entry["part"])
+            own = self._passed_on(fitted)
+            shares = [(entry["share"] - rounded.get(entry["part"], 0.0) - own,
+                       entry["ci95"][0] - rounded.get(entry["part"], 0.0) - own, entry["part"])
                       for entry in parts if entry["part"] != "noise"]
             self._structures[fitted.causes] = sorted(
                 ((share, part) for share, low, part in shares
@@ -385,8 +410,7 @@ class Engine:
     def odd_share(self, best, cause):
         """Share of the power that a cause adds which turns its sign with the motion."""
         p = self.problem
-        back = Problem(dataclasses.replace(p.record, reference=-p.record.reference), p.axis,
-                       p.baseline, p.used, p.limit)
+        back = p.mirrored()
         less = {name: effect for name, effect in best.effects.items() if name != cause}
         try:
             here, there = (q.clear(q.simulate(best.effects) - q.simulate(less), best.free)
@@ -434,5 +458,8 @@ class Engine:
         p = self.problem
         across = [signal for axis, signal in enumerate(p.record.reference.T)
                   if axis != p.axis and np.ptp(signal)]
-        return leftover(fitted.residual, fitted.simulated, p.used, across,
-                        self.coarse_step(fitted))
+        found = leftover(fitted.residual, fitted.simulated, p.used, across,
+                         self.coarse_step(fitted))
+        own = self._passed_on(fitted)
+        return dataclasses.replace(found, linear=max(found.linear - own, 0.0),
+                                   level=max(found.level - own, 0.0))

@@ -1,9 +1,10 @@
 """Whether a record without a model is better begun with a gain than with an oscillator."""
 
+from ..identification.response.excitation import strongest_stretch
 from ..model import SensorModel
 from ..model.core import Gain
 from ..model.effects import Effect, known_effects
-from .engine import Engine
+from .engine import LONG, Engine
 
 # Links that are fitted, and the share of an oscillator's residual power that one may leave.
 _FITTED = 6
@@ -37,6 +38,9 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
     (SensorModel, dict of str to Effect), or None
         With the gain, and what to begin with instead.
     """
+    if len(record) > LONG:
+        rows = strongest_stretch(record.reference[:, column], LONG // 2)
+        record, used = record.part(rows), used[rows]
     own = Engine(record, column, model, used, opened(model), limit=limit)
     before = own.search.fit({**own.search.base, **seed})
     flat = SensorModel(Gain(model.axes[column].core.sensitivity))

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel
+from ..model.effects import effect_of
 from .doubts import by_what_is_left, doubts_about, left_open
 from .empirical import fit_empirical_link
 from .empirical_map import fit_empirical_map
@@ -79,7 +80,9 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
                         gain_words(cause, g, margin, instead), g)
         if cause in doubts:
             suspects.append(_suspect({cause}, 0.0, doubts[cause]))
-        elif margin > _CLEAR:
+        elif margin > _CLEAR or (best.effects[cause].everyday and instead and not any(
+                effect_of(name).everyday for name in instead)):
+            # of two that say the same, what is common
             findings.append(entry)
         else:
             suspects.append(_suspect({cause, *instead}, margin, "another cause explains as much"))
@@ -204,13 +207,16 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
         """What the reference's own noise does not account for."""
         return np.sqrt(max(rms**2 - own**2, 0.0))
     # the record is all of it, not only the part that is held out
-    error = max(after, engine.rms(fitted.residual))
+    errors = p.errors(fitted)
+    error = max(after, _rms(errors, engine.wanted & np.isfinite(errors)))
     accounted = is_accounted(beyond(min([error, *by_itself])), spread, noise)
     faulty = accounted and not is_accounted(
-        beyond(_rms(p.measured - fitted.output, p.used | engine.aside)), spread, noise)
+        beyond(_rms(errors, (engine.wanted | engine.aside) & np.isfinite(errors))), spread, noise)
     strange = engine.structure(fitted)
-    verdict = verdict_of(findings, suspects, complete, left.share, fraction, accounted,
-                         strange or faulty)
+    # beside a model that leaves nothing that stands out, what is only suspected is chance
+    plain = not findings and not strange and engine.left(fitted).share == 0
+    verdict = verdict_of(findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
+                         fraction, accounted, strange or faulty)
     effects = {**fitted.effects, **{f.cause: f.effect for f in findings}}
     described, after = _described(engine, fitted, after, {part for _, part in strange}) \
         if verdict in _INCOMPLETE else ({}, after)
@@ -219,9 +225,9 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
                    "a part of it and names nothing") if described else ""
     return Diagnosis(
         verdict, reason_of(verdict, error / spread, noise, accounted, strange)
-        + set_aside(engine.aside, p.record.valid) + description
+        + set_aside(engine.aside, engine.record.valid) + description
         + (f"; {min(own / error, 1.0)**2:.0%} of that power is what the reference's own noise hides"
-           if own > 0 else ""),
+           if own > 0.1 * error else ""),
         {"rmse": before, "nrmse": before / spread, "noise_rms": noise_rms},
         findings, suspects,
         {"rmse": after, "nrmse": after / spread},

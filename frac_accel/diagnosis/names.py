@@ -32,6 +32,8 @@ def undetermined(effect, unknowns, theta, stds, core, duration_s):
     duration_s : float
         Of the record.
     """
+    if effect.degenerate():
+        return effect.degenerate()
     moved = not unknowns
     for unknown, place in zip(unknowns, theta):
         value, std = getattr(effect, unknown.name), stds.get(unknown.name, np.inf)

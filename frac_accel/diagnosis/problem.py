@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ..errors import FracAccelError
+from ..identification.response.excitation import strongest_stretch
 from ..model import AXES, AxisModel, is_link
 from ..model.core.oscillator import tail_rates
 from ..model.effects.base import CORE, CROSS_AXIS, GAIN, Effect
@@ -27,6 +28,8 @@ _SINGULAR = 1e-10
 # the cause adds, where measured) and for its derivatives (ten times that, which bends no fit).
 _STEPS = 4
 _STEPS_OF_SLOPES = 2
+# Times the largest measured value from which a simulated one counts as without a bound.
+_UNBOUND = 1e6
 # Logarithm of what is left of a decay where it ends.
 _GONE = -60.0
 # A gain of this share of one sample's error changes nothing that the data can tell.
@@ -137,9 +140,11 @@ class Fitted:
 
     @property
     def size(self):
-        """Number of parameters that were chosen: those fitted, and the orders and kinds tried."""
-        return len(self.unknowns) + sum(len(fixed_values(effect))
-                                        for effect in self.effects.values())
+        """Number of parameters that were chosen: those fitted, the orders and kinds tried, and the
+        constant and the drift that are free where a filter of the reference has lost them."""
+        return len(self.unknowns) + sum(
+            len(fixed_values(effect)) + 2 * bool(np.any(effect.poles() == 0))
+            for effect in self.effects.values())
 
     @functools.cached_property
     def jacobian(self):
@@ -329,6 +334,47 @@ class Problem:
         masked = values * (self.used if values.ndim == 1 else self.used[:, None])
         return masked - free @ (free.T @ masked)
 
+    def taken(self, values):
+        """Values of the record as they are simulated: all of them."""
+        return values
+
+    def put_back(self, values, whole):
+        """A whole record's values with those that are simulated replaced: all of them."""
+        return values
+
+    def strongest(self, length):
+        """Slice of at most `length` samples where the motion is strongest."""
+        return strongest_stretch(self.record.reference[:, self.axis], length)
+
+    @property
+    def coherent(self):
+        """Slice without gaps in time: all."""
+        return slice(0, len(self.record))
+
+    def part(self, rows):
+        """Record of a slice."""
+        return self.record.part(rows)
+
+    def errors(self, fitted):
+        """Measured less simulated with a fit, everywhere in the record; NaN where not known."""
+        found = np.full(len(self.record), np.nan)
+        inside = slice(self.edge, len(found) - self.edge)
+        found[inside] = (self.measured - fitted.output)[inside]
+        return found
+
+    def dated(self, fit):
+        """Effects of a fit, with its instants where the whole record has them."""
+        return fit.effects
+
+    def response(self, axis):
+        """Output of one axis of the model in use, before its effects on the samples, shape (n,)."""
+        return self.simulator(axis).respond(self.baseline.axis(axis))
+
+    def mirrored(self):
+        """The same problem with the reference turned round."""
+        return Problem(dataclasses.replace(self.record, reference=-self.record.reference),
+                       self.axis, self.baseline, self.used, self.limit)
+
     def restricted(self, used):
         """The same problem with fewer samples that count."""
         part = object.__new__(type(self))
@@ -438,8 +484,7 @@ class Problem:
     def point(self, effects, rough):
         """`Point` with these parameters; raises FracAccelError where the motion has no bound."""
         simulated = self.simulate(effects, steps=_STEPS_OF_SLOPES if rough else _STEPS)
-        if not np.isfinite(simulated).all():
-            raise FracAccelError("the motion has no bound")
+        self._require_bound(simulated)
         columns = self.free_columns(effects)
         free, back = _span(columns * self.used[:, None])
         error = (self.measured - simulated) * self.used
@@ -447,6 +492,12 @@ class Problem:
         residual = error - free @ components
         return Point(effects, simulated, columns, free, back @ components, residual,
                      float(residual @ residual))
+
+    def _require_bound(self, simulated):
+        """Refuse an output that is out of all proportion: one that only begins to grow beyond all
+        numbers would spoil every product."""
+        if not np.max(np.abs(simulated)) < _UNBOUND * max(np.max(np.abs(self.measured)), 1e-300):
+            raise FracAccelError("the motion has no bound")
 
     def cost(self, effects, rough=False):
         """Cost of these causes with the parameters that they have; infinite without a bound."""
@@ -487,6 +538,7 @@ class Problem:
                     else:
                         # with forces, what comes across stays as it is: a few per cent of a column
                         change = self.simulate(new, not forced, steps) - before
+                    self._require_bound(change)
                 except FracAccelError:
                     continue
                 free = self.free_columns(new)
@@ -571,8 +623,7 @@ class Problem:
         """
         moving = [axis for axis in range(3) if np.ptp(self.record.reference[:, axis])]
         shares, stds = np.full((2, 3, 3), np.nan)
-        columns = [self.simulator(axis).respond(self.baseline.axis(axis))[self.used]
-                   for axis in moving]
+        columns = [self.response(axis)[self.used] for axis in moving]
         basis = np.stack([*columns, np.ones(self.count)], axis=1)
         inverse = np.linalg.pinv(basis.T @ basis)
         for axis in range(3):

@@ -78,9 +78,12 @@ def _certainty(g):
 def read_off(engine, fitted, found, shown, sensor):
     """Findings that the record shows by itself: limits, lattice, stamps."""
     p, findings = engine.problem, []
-    rows = p.record.valid.copy()
+    here = p.coherent
+    record = p.part(here)
+    rows = record.valid.copy()
     rows[:64] = rows[-64:] = False
-    seen = Seen(p.record, found, sensor, p.measured, fitted.output, rows, rows & p.used,
+    seen = Seen(record, found, sensor, p.measured[here], fitted.output[here], rows,
+                rows & p.used[here],
                 engine.coarse_step(fitted) is not None,
                 {entry["part"]: entry["share"] for entry in engine.budget(fitted).parts})
     # what the size of a residual tells presumes that it is noise, or bursts of it

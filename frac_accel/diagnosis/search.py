@@ -26,8 +26,10 @@ _STUCK = 0.2
 _TRIAL = 4
 _HOPELESS = 4.0
 _BEHIND = 2.0
-# Fits whose arrays are kept; those of others are made again when asked for.
+# Fits whose arrays are kept, of a record of so many samples or fewer; of longer ones fewer are, but
+# two. Those of others are made again when asked for.
 _AT_HAND = 8
+_AT_HAND_SAMPLES = 20_000
 # Samples by which causes are screened, where a record has more.
 _SCREENED = 6000
 # Variances from the best fit of a round within which a fit must come if it goes on as it goes.
@@ -78,10 +80,16 @@ class Search:
             self._keep(better)
         return better
 
+    def again(self, effects):
+        """A known set fitted anew, from other parameters."""
+        self._keep(self.problem.fit(effects))
+        return self.fits[frozenset(effects)]
+
     def _keep(self, fit):
         self.fits.pop(fit.causes, None)
         self.fits[fit.causes] = fit
-        for older in list(self.fits.values())[-2 * _AT_HAND:-_AT_HAND]:
+        most = min(_AT_HAND, max(_AT_HAND * _AT_HAND_SAMPLES // len(self.problem.record), 2))
+        for older in list(self.fits.values())[-2 * _AT_HAND:-most]:
             older.let_go()
         self.log(f"fit {sorted(fit.causes - set(self.base))}: {fit.cost:.6g}")
 

@@ -6,7 +6,7 @@ from ..budget import WORDS
 # Share of the output's RMS that may be left without noise being established, and factor by which an
 # error may exceed noise that is.
 _LITTLE = 0.05
-_AS_NOISE = 1.2
+AS_NOISE = 1.2
 # Share of the excess power that rounds to nothing.
 _NOTHING = 0.005
 # Share of the residual's power that may be no noise in a record that counts as explained.
@@ -15,7 +15,7 @@ _MOSTLY_NOISE = 0.3
 
 def is_accounted(rmse, spread, noise):
     """Whether an error is small beside the output's spread, or no larger than established noise."""
-    return rmse <= _LITTLE * spread or (noise.rms is not None and rmse <= _AS_NOISE * noise.rms)
+    return rmse <= _LITTLE * spread or (noise.rms is not None and rmse <= AS_NOISE * noise.rms)
 
 
 def verdict_of(findings, suspects, complete, share, fraction, accounted, strange):
@@ -25,7 +25,7 @@ def verdict_of(findings, suspects, complete, share, fraction, accounted, strange
         return "consistent" if accounted else "undecided"
     nothing = fraction < _NOTHING
     if findings and (nothing or complete and share <= _MOSTLY_NOISE):
-        return "explained" if accounted else "undecided"
+        return "explained" if accounted else "partly_explained" if strange else "undecided"
     if findings:
         return "partly_explained"
     return "unexplained"

@@ -68,6 +68,14 @@ class AxisModel:
         return any(type(effect).base_gain is not Effect.base_gain for effect in self.effects)
 
     @property
+    def behind_base(self):
+        """The same without the effects on what is recorded of the base, and these."""
+        on_base = tuple(effect for effect in self.effects
+                        if type(effect).change_base is not Effect.change_base)
+        return AxisModel(self.core, tuple(effect for effect in self.effects
+                                          if effect not in on_base)), on_base
+
+    @property
     def path_dependent(self):
         """Effects that change the core's motion on its way to the links behind."""
         return tuple(effect for effect in self.effects

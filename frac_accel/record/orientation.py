@@ -116,6 +116,11 @@ class Orientation:
         own = self.nearest[place, place] != 0 and self.explained[place] > _EXPLAINED
         return bool(elsewhere) and not own and not abs(self.rotation[place, place]) > 0.5
 
+    def opposes(self, axis, sign):
+        """Whether an axis of the sensor follows its own of the reference the other way round than
+        with a `sign` of 1 or -1."""
+        return self.followed(axis) == ("" if sign < 0 else "-") + axis
+
     def turn(self, samples):
         """Samples of the sensor in the reference's axes.
 

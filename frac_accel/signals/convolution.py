@@ -11,6 +11,8 @@ _DAMPING = np.log(1e8)
 _PERIOD = 2
 # Share of the frequencies, the highest, over which a response is turned to be real at the last.
 _TURNED = 0.2
+# Undamping factors that are kept.
+_UNDAMPINGS = 3
 _LAGRANGE_POINTS = 8
 
 
@@ -84,6 +86,9 @@ class Convolution:
     def _undamped(self, factor, count):
         key = factor, count
         if key not in self._undamping:
+            # a clock that runs differently needs another count each time
+            while len(self._undamping) > _UNDAMPINGS:
+                del self._undamping[next(iter(self._undamping))]
             self._undamping[key] = factor * np.exp(self._sigma / factor * np.arange(count))
         return self._undamping[key]
 

@@ -164,7 +164,7 @@ class AxisSimulator:
         self._least_steps = steps_per_sample
         self._lag_s = lag_s
         self._convolution, self._room_s = None, 0.0
-        self._transfers, self._motions, self._deviations = {}, {}, {}
+        self._transfers, self._motions, self._deviations, self._bases = {}, {}, {}, {}
         self.circumstances = Circumstances(start_time_s + np.arange(self._n) / self._rate,
                                            _temperature(temperature_c, self._n))
 
@@ -187,10 +187,20 @@ class AxisSimulator:
 
     def respond(self, axis_model):
         """Output of the core and its links, delay and clock: before the effects on the samples."""
+        axis_model, on_base = axis_model.behind_base
+        if on_base:
+            return kept(self._bases, on_base, self._behind, on_base, most=1).respond(axis_model)
         if axis_model.changes_base:
             gain = axis_model.base_gain(self.circumstances.time_s + self._lag_s)
             return self._with_base(gain * (self._moving + self._level))._respond(axis_model)
         return self._respond(axis_model)
+
+    def _behind(self, on_base):
+        """Simulator for the base's acceleration behind what is recorded of it."""
+        values = self._moving + self._level
+        for effect in on_base:
+            values = effect.change_base(values, self._rate)
+        return self._with_base(values)
 
     def _with_base(self, reference):
         """The same simulator for another acceleration of the base."""
@@ -263,7 +273,7 @@ class AxisSimulator:
             start = force.equilibrium(load) - load
             deviation = kept(self._deviations, (known_by, force), nonlinear_motion.deviation,
                              modes, force, natural / (self._rate * steps), motion, start,
-                             natural * self._start_time_s)
+                             natural * self._start_time_s, most=3)
         if not np.isfinite(deviation[-1]):
             raise FracAccelError("the model's motion grows without bound: its nonlinear terms are "
                                  "too large for this record")

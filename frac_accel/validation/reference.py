@@ -41,6 +41,8 @@ def restored(reference, sensor, model, axis="x", temperature_at=None):
     time = np.arange(len(pair)) / rate
     values = np.empty_like(pair.reference)
     for i, recorded in enumerate(pair.reference.T):
+        for fault in model.reference_faults:
+            recorded = fault.change_base(recorded, rate)
         convolution = Convolution(recorded - recorded[0], rate)
         transfer = np.ones_like(convolution.s)
         for fault in model.reference_faults:

@@ -213,6 +213,10 @@ class Effect:
         return isinstance(core, Oscillator) or (
             cls.change_core is Effect.change_core and cls.add_force is Effect.add_force)
 
+    def degenerate(self):
+        """Why, with these parameters, it is not what its name says, in words; or None."""
+        return None
+
     def pure_delay_s(self):
         """Time [s] by which this effect moves the signal as it is."""
         return 0.0
@@ -235,6 +239,10 @@ class Effect:
     def add_force(self, force):
         """`StaticForce` of the core's spring as this effect leaves it."""
         return force
+
+    def change_base(self, values, sampling_rate_hz):
+        """The base's acceleration, shape (n,), from what is recorded of it."""
+        return values
 
     def base_gain(self, time_s):
         """Gain of the base's acceleration before the core, at times [s] since the record's start.

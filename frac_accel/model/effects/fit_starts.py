@@ -180,8 +180,13 @@ def jumps(view, shape):
     best = inner[np.argmax(before**2 * power[inner] + after**2 * beyond)]
     alone = inner[np.argmax(after**2 * beyond)]
     changes = dict(zip(inner, after - before)), dict(zip(inner, after))
-    return [(float((place + 0.5) / view.rate), float(change[place]))
+    return [(_after(view, place), float(change[place]))
             for place, change in zip((best, alone), changes)]
+
+
+def _after(view, place):
+    """Instant [s] of the record half an interval after a sample."""
+    return float(view.since_start_s + view.time[place] + 0.5 / view.rate)
 
 
 def jump_between(view, before, after):
@@ -190,4 +195,4 @@ def jump_between(view, before, after):
     inner = slice(_SIDE, -_SIDE)
     if len(gained[inner]) == 0:
         return None
-    return float((_SIDE + np.argmax(gained[inner]) + 0.5) / view.rate)
+    return _after(view, _SIDE + int(np.argmax(gained[inner])))

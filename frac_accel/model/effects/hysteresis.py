@@ -7,6 +7,10 @@ from .base import CORE, Effect, require_oscillator
 from .fit_starts import positive
 
 
+# Times that -gamma may exceed beta: beyond it the branches only bend.
+_BENDS = 3.0
+
+
 @dataclasses.dataclass(frozen=True)
 class Hysteresis(Effect):
     r"""Restoring force :math:`\omega_0^2 \lambda z`.
@@ -30,6 +34,10 @@ class Hysteresis(Effect):
 
     def change_core(self, core):
         return require_oscillator(core, self.cause)
+
+    def degenerate(self):
+        return "it bends without a loop, as a law of the spring without memory does" \
+            if self.gamma < -_BENDS * self.beta else None
 
     def add_force(self, force):
         return dataclasses.replace(force, strength=self.strength, beta=self.beta, gamma=self.gamma)

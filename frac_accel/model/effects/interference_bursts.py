@@ -56,8 +56,8 @@ class InterferenceBursts(Effect):
         """A mixture of two noises, the louder one in stretches that the motion does not explain."""
         error = (seen.measured - seen.output)[seen.used]
         output = seen.output[seen.used]
-        if len(error) < 10 * _WINDOW:
-            return None
+        if len(error) < 10 * _WINDOW or seen.record.resampled:
+            return None  # where the motion is too fast for one topic, the other's instants lack it
         noise, loud, share, better = _two_noises(error)
         if seen.parts.get("bursts", 0.0) < _SHOWN or not 0 < share < _MOST \
                 or loud < _LOUDER**2 * noise or better < _BETTER:

@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from ..parameters import coefficients, parameter
 from .base import REFERENCE, Effect, Reading
@@ -12,8 +13,8 @@ from .base import REFERENCE, Effect, Reading
 class ReferenceNoise(Effect):
     """White noise on the reference.
 
-    Its link is the filter with the least error between the record and the motion
-    (`budget.reference_noise`): `share` of what is recorded at some frequencies, without a delay.
+    The motion is best guessed by the filter with the least error (`budget.reference_noise`):
+    `share` of what is recorded at some frequencies, without a delay.
     """
 
     cause = "reference_noise"
@@ -29,8 +30,14 @@ class ReferenceNoise(Effect):
     frequency_hz: tuple = coefficients()
     share: tuple = coefficients()
 
-    def transfer_function(self, s):
-        return np.interp(np.abs(s) / (2 * np.pi), self.frequency_hz, self.share) + 0j
+    def change_base(self, values, sampling_rate_hz):
+        # it begins before the motion, by as much as its frequencies are apart
+        length = next_fast_len(len(values) + int(2 * sampling_rate_hz / self.frequency_hz[1]),
+                               real=True)
+        frequency = rfftfreq(length, 1 / sampling_rate_hz)
+        share = np.interp(frequency, self.frequency_hz, self.share)
+        level = values.mean()
+        return level + irfft(share * rfft(values - level, length), length)[:len(values)]
 
     def unknown_density(self, frequency_hz):
         white = self.std**2 / self.frequency_hz[-1]
@@ -39,7 +46,8 @@ class ReferenceNoise(Effect):
     @classmethod
     def of_record(cls, found, measured):
         noise = found.reference_noise
-        return noise and cls(noise.std, noise.frequency_hz, noise.share)
+        return cls(noise.std, noise.frequency_hz, noise.share) \
+            if noise and noise.bends else None
 
     def reading(self, seen):
         """What it explains, a fit without it tells: here the error is what that with it leaves."""

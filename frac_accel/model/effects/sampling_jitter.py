@@ -39,8 +39,8 @@ class SamplingJitter(Effect):
     @classmethod
     def recognised(cls, seen, shown):
         """The residual's power is noise and J**2 times the slope's, sample by sample."""
-        if seen.found.jitter_rms_s:
-            return None  # stamps that scatter do the same
+        if seen.found.jitter_rms_s or seen.record.resampled:
+            return None  # stamps that scatter do the same, and so do values between samples
         rate, used = seen.record.sampling_rate_hz, seen.used
         error = (seen.measured - seen.output)[used]
         slope = _slope(seen.output)
