@@ -11,6 +11,7 @@ import os
 
 from ..errors import FracAccelError
 from ..fleet.inspection import inspect
+from ..fleet.places import find_bags, output_at
 from ..fleet.plan import Models, Plan, Table, known_bags
 from ..fleet.workers import Cluster, LocalCores, Named
 from ..identification import STRUCTURES
@@ -92,7 +93,8 @@ def _add_validate(parser):
 def run(arguments):
     """Do it."""
     try:
-        from ..fleet.places import find_bags
+        import fsspec  # noqa: F401
+
         from ..fleet.store import Store
     except ModuleNotFoundError as error:
         raise FracAccelError(f"the Python library {error.name} is missing; install it with "
@@ -209,7 +211,6 @@ def _summary(arguments, bags, tasks, failed):
 def _overview(arguments, store, jobs):
     """What the fleet shows, as text and page; an `Overview`."""
     from ..fleet.overview import overview
-    from ..fleet.places import output_at
     from ..report.fleet import fleet_page
     seen = overview(store.read(), store.given, jobs)
     for line in seen.words:

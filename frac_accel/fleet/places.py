@@ -1,13 +1,10 @@
-"""Bags and results on disks and in object stores, by fsspec."""
+"""Bags and results on disks and in object stores, by fsspec (loaded when it is needed)."""
 
 import contextlib
 import os
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
-
-import fsspec
-from fsspec.implementations.local import LocalFileSystem
 
 from ..errors import FracAccelError
 
@@ -54,7 +51,7 @@ def find_bags(patterns):
     found = {}
     for pattern in patterns:
         try:
-            fs, path = fsspec.core.url_to_fs(pattern)
+            fs, path = file_system(pattern)
             before = len(found)
             for place in _expanded(fs, path):
                 for bag in _bags_at(fs, place):
@@ -96,7 +93,14 @@ def _bag(fs, path, infos):
 
 def is_local(fs):
     """Whether a file system is this machine's."""
+    from fsspec.implementations.local import LocalFileSystem
     return isinstance(fs, LocalFileSystem)
+
+
+def file_system(url):
+    """File system of a URL, and the path there."""
+    from fsspec.core import url_to_fs
+    return url_to_fs(url)
 
 
 def _url(fs, path):
@@ -107,7 +111,7 @@ def _url(fs, path):
 def at_hand(url):
     """Path of a bag on a local disk; a copy for as long as this is entered where it is elsewhere.
     """
-    fs, path = fsspec.core.url_to_fs(url)
+    fs, path = file_system(url)
     if is_local(fs):
         yield Path(path)
         return
@@ -123,7 +127,7 @@ def output_at(url):
 
     What is written to a local disk must itself be put there in one piece.
     """
-    fs, path = fsspec.core.url_to_fs(url)
+    fs, path = file_system(url)
     if is_local(fs):
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         yield path

@@ -6,13 +6,12 @@ import os
 import time
 import uuid
 
-import fsspec
 import pyarrow as pa
 import pyarrow.dataset
 import pyarrow.parquet
 
 from ..errors import FracAccelError
-from .places import is_local
+from .places import file_system, is_local
 
 # Longest time [s] and most rows for which rows are kept back to be written together.
 _PATIENCE_S = 5.0
@@ -68,7 +67,7 @@ class Store:
     """
 
     def __init__(self, results, verb, given=()):
-        self.fs, root = fsspec.core.url_to_fs(results)
+        self.fs, root = file_system(results)
         self.root, self.folder = root, f"{root.rstrip('/')}/{verb}"
         self.given = list(given)
         self.schema = pa.schema([*COLUMNS.items(), *((name, pa.string()) for name in given)])
