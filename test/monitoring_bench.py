@@ -67,14 +67,15 @@ def drives(count, first=0):
 
 
 def healthy(hours):
-    """Six drives of ten minutes, again and again with new noise, as one."""
+    """Six drives of ten minutes, again and again with new noise, with half a minute between."""
     model = SensorModel.from_dict(MODEL)
-    parts = [ChangingDrive(2000 + i, {}) for i in range(6)]
+    # one sensor, whatever it is driven over
+    parts = [ChangingDrive(2000 + i, {}, noise_std=5e-3) for i in range(6)]
     watch, alarms, largest = Watch(model), 0, 0.0
     for number in range(round(hours * 6)):
         drive = parts[number % len(parts)]
         for one in zip(*map(chunks, drive.samples())):
-            watch.add(*(part._replace(stamps_ns=part.stamps_ns + number * 600 * 10**9)
+            watch.add(*(part._replace(stamps_ns=part.stamps_ns + number * 630 * 10**9)
                         for part in one))
         largest = max(largest, watch.detector.statistic)
         if watch.changed is not None:

@@ -24,14 +24,17 @@ class ChangingDrive:
         Time over which it grows; 0: at once.
     duration_s : float
     snr_db : float
+    noise_std : float, optional
+        Instead of that [output units].
     """
 
-    def __init__(self, seed, effects, at_s=0.0, ramp_s=0.0, duration_s=600.0, snr_db=50.0):
+    def __init__(self, seed, effects, at_s=0.0, ramp_s=0.0, duration_s=600.0, snr_db=50.0,
+                 noise_std=None):
         rng = np.random.default_rng(seed)
         self.drive = draw_drive(rng)
         excitation = drive_on_road(rng, RATE_HZ, duration_s, self.drive)
         before = simulate_record(Sensor(CORE), excitation)
-        self.noise_std = float(before.clean[:, 0].std() * 10 ** (-snr_db / 20))
+        self.noise_std = noise_std or float(before.clean[:, 0].std() * 10 ** (-snr_db / 20))
         share = 0.0
         after = before
         if effects:

@@ -16,6 +16,10 @@ from ..record import Record
 
 # Length of a block [s].
 BLOCK_S = 0.25
+# Samples that may be missing in a row and be bridged, and time [s] that the motion needs to settle
+# after more.
+_BRIDGED = 3
+SETTLING_S = 1.5
 # Residual power below this share of the output's is numerics.
 _FLOOR = 1e-9
 
@@ -94,7 +98,7 @@ def blocks_of(reference, sensor, model, axis, keep_from_ns, epoch_ns):
     column = AXES.index(axis)
     record = Record.of(reference, sensor, axis)
     record = dataclasses.replace(record, since_start_s=1e-9 * (record.start_ns - epoch_ns))
-    problem = Problem(record, column, model, record.valid)
+    problem = Problem(record, column, model, _settled(record))
     point = problem.point({}, False)
     if not np.isfinite(point.cost):
         raise FracAccelError("the model's motion has no bound")
@@ -116,6 +120,16 @@ def blocks_of(reference, sensor, model, axis, keep_from_ns, epoch_ns):
         float(np.std(record.reference[problem.used, column])))
     total = max(blocks.count.sum(), 1.0)
     return blocks, float(np.sqrt(blocks.power.sum() / total))
+
+
+def _settled(record):
+    """Samples that are there and not too near after a gap, over which nobody knows the motion."""
+    used = record.valid.copy()
+    edges = np.flatnonzero(np.diff(np.r_[False, ~record.valid, False].astype(np.int8)))
+    for first, last in zip(edges[::2], edges[1::2]):
+        if last - first > _BRIDGED:
+            used[first:last + round(SETTLING_S * record.sampling_rate_hz)] = False
+    return used
 
 
 def _directions(simulated, reference, column, rate, used):

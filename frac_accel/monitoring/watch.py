@@ -7,13 +7,13 @@ import numpy as np
 
 from ..errors import FracAccelError
 from ..io.samples import Samples
-from .blocks import BLOCK_S, Blocks, blocks_of
+from .blocks import BLOCK_S, SETTLING_S, Blocks, blocks_of
 from .detector import FALSE_ALARM_H, TOGETHER, Detector
 from .onset import onset
 
-# Length of a window, and of what is taken before it for the motion to settle [s].
+# Length of a window, and of what is taken before and after it, where the motion settles [s].
 WINDOW_S = 10.0
-_LEAD_S = 1.5
+_LEAD_S = SETTLING_S
 _TAIL_S = 0.5
 # Windows that are kept as they came, and blocks for the onset [s].
 _RECENT_S = 300.0
