@@ -13,8 +13,8 @@ from .onset import onset
 
 # Length of a window, and of what is taken before and after it, where the motion settles [s].
 WINDOW_S = 10.0
-_LEAD_S = SETTLING_S
 _TAIL_S = 0.5
+_LEAD_S = SETTLING_S
 # Windows that are kept as they came, and blocks for the onset [s].
 _RECENT_S = 300.0
 _MEMORY_S = 3600.0
