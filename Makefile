@@ -13,6 +13,8 @@ venv := .venv
 oldest := .venv-oldest
 python := $(venv)/bin/python
 numerical := -m pytest -n 2
+# What an installer says is kept, and shown only where it fails.
+quietly = > $(venv)/install.log 2>&1 || { cat $(venv)/install.log; exit 1; }
 
 pythons := python3 python3.13 python3.12 python3.11 python3.10
 # Those for which scipy 1.11.4 has wheels; ROS 2 Jazzy itself has 3.12.
@@ -20,12 +22,12 @@ oldest_pythons := python3.12 python3.11 python3.10 python3
 find_oldest := sh tools/find_python.sh 12 $(oldest_pythons)
 
 metadata := package.xml setup.py setup.cfg pyproject.toml
-sources := $(shell find frac_accel config launch resource scripts -type f ! -name '*.pyc')
+sources := $(shell find bags frac_accel config launch resource scripts -type f ! -name '*.pyc')
 
 setup: install/.done
 
 demo: setup
-	$(python) -m frac_accel.demo --output-dir demo_output
+	@$(python) -m frac_accel.demo --output-dir demo_output
 
 # BLAS threads would only fight with the other worker.
 check test test-all test-others test-oldest: export OPENBLAS_NUM_THREADS := 1
@@ -115,15 +117,19 @@ made_for := $(CURDIR) $(shell $(or $(PYTHON),$(python)) -V 2>/dev/null)
 ifneq ($(shell cat $(venv)/.done 2>/dev/null),$(made_for))
 $(venv)/.done: FORCE
 endif
+# uv, which takes a tenth of pip's time; pip where uv has no way to the index that pip is set up for.
 # empy comes as source only: setuptools first, then no build isolation, which would fetch another.
 $(venv)/.done: requirements/venv.txt
-	found=$$(sh tools/find_python.sh 13 $(or $(PYTHON),$(pythons))) && \
+	@echo "installing the pinned packages into $(venv)"
+	@found=$$(sh tools/find_python.sh 13 $(or $(PYTHON),$(pythons))) && \
 	    rm -rf $(venv) && "$$found" -m venv $(venv)
-	sed -n '/^setuptools==/,/[^\\]$$/p' $< > $(venv)/setuptools.txt
-	$(python) -m pip install -q --require-hashes --no-deps -r $(venv)/setuptools.txt
-	$(python) -m pip install -q --require-hashes --no-deps --no-build-isolation --use-pep517 -r $<
-	for shell in sh bash; do cp tools/wheels_setup.sh $(venv)/local_setup.$$shell || exit; done
-	echo "$(CURDIR) $$($(python) -V)" > $@
+	@sed -n '/^\(setuptools\|uv\)==/,/[^\\]$$/p' $< > $(venv)/first.txt
+	@{ $(python) -m pip install --require-hashes --no-deps -r $(venv)/first.txt && \
+	    { $(venv)/bin/uv pip install --python $(python) --no-build-isolation --require-hashes --no-deps -r $< || \
+	    $(python) -m pip install --no-build-isolation --use-pep517 --require-hashes --no-deps -r $<; }; \
+	    } $(quietly)
+	@for shell in sh bash; do cp tools/wheels_setup.sh $(venv)/local_setup.$$shell || exit; done
+	@echo "$(CURDIR) $$($(python) -V)" > $@
 
 $(oldest)/.done: requirements/oldest.txt
 	found=$$($(find_oldest)) && rm -rf $(oldest) && "$$found" -m venv $(oldest)
@@ -131,12 +137,11 @@ $(oldest)/.done: requirements/oldest.txt
 	touch $@
 
 $(venv)/.frac_accel: $(venv)/.done $(metadata)
-	$(python) -m pip install -q --no-deps --no-build-isolation --editable .
-	touch $@
+	@$(python) -m pip install --no-deps --no-build-isolation --editable . $(quietly)
+	@touch $@
 
 install/.done: $(venv)/.frac_accel $(sources)
-	rm -rf build install
-	AMENT_PREFIX_PATH=$(CURDIR)/$(venv) $(venv)/bin/colcon --log-base build/log build \
-	    > build.log 2>&1 || { cat build.log; exit 1; }
-	mv build.log build/
-	touch $@
+	@echo "building the workspace in install"
+	@rm -rf build install
+	@AMENT_PREFIX_PATH=$(CURDIR)/$(venv) $(venv)/bin/colcon --log-base build/log build $(quietly)
+	@touch $@

@@ -1,36 +1,58 @@
 """Build script of the ament_python package, for colcon and for pip."""
 
+import sys
+import xml.etree.ElementTree
 from pathlib import Path
 
 from setuptools import find_packages, setup
 
 PACKAGE = "frac_accel"
+# colcon may run this through a link from elsewhere
+ROOT = Path(__file__).resolve().parent
+NODES = ("corrector", "diagnoser", "player", "recorder", "virtual_sensor")
 
 
-def shared(folder):
+def shared(folder, pattern="*"):
     """Return the ``data_files`` entries that install `folder` below ``share/frac_accel``."""
     by_parent = {}
-    for path in sorted(Path(folder).rglob("*")):
+    for path in sorted(Path(folder).rglob(pattern)):
         if path.is_file() and path.parent.name != "__pycache__":
             by_parent.setdefault(f"share/{PACKAGE}/{path.parent}", []).append(str(path))
     return list(by_parent.items())
 
 
+# A wheel's scripts all come on PATH, under names as common as `player`; and a file of ours in bin/
+# would be the command's second one. What `ros2 run` and a workspace need is for colcon, which calls
+# `install` or `develop`.
+scripts, files = [f"{PACKAGE} = {PACKAGE}.cli:main"], []
+if not {"bdist_wheel", "dist_info", "editable_wheel"} & set(sys.argv):
+    scripts += [f"{node} = {PACKAGE}.nodes.{node}:main" for node in NODES]
+    files += [("bin", [f"scripts/{PACKAGE}"])]
+
+# What a ROS machine reads of the package, and an index of Python packages too.
+about = xml.etree.ElementTree.parse(ROOT / "package.xml").getroot()
+
 setup(
     name=PACKAGE,
-    version="0.1.0",
-    description="Identify, simulate, correct and diagnose accelerometers on ROS 2",
-    license="Apache-2.0",
-    maintainer="frac_accel developers",
-    maintainer_email="maintainers@frac-accel.example",
+    version=about.findtext("version"),
+    description=" ".join(about.findtext("description").split()),
+    long_description=(ROOT / "README.md").read_text(encoding="utf-8"),
+    long_description_content_type="text/markdown",
+    license=about.findtext("license"),
+    maintainer=about.findtext("maintainer"),
+    maintainer_email=about.find("maintainer").get("email"),
+    project_urls={url.get("type"): url.text for url in about.findall("url")},
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
     package_data={PACKAGE: ["**/*.msg", "**/*.yaml", "**/*.html", "py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
-        ("bin", ["scripts/frac_accel"]),
         *shared("config"),
         *shared("launch"),
+        # what `paper` and the demonstration read
+        *shared("bags", "paper_bench*"),
+        *shared("bags", "viscoelastic_bench*"),
+        *files,
     ],
     zip_safe=False,
     python_requires=">=3.10",
@@ -47,17 +69,11 @@ setup(
     ],
     extras_require={
         "bench": ["PyDynamic>=2.4"],  # what `frac_accel bench` compares with
+        "formats": ["rosbags>=0.10", "pyarrow", "asammdf>=8"],  # what `convert` reads and writes
+        "ros": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"],  # ROS from wheels
+        "test": ["pytest", "pytest-timeout", "rosbags"],  # the fast part of the suite
         # `frac_accel fleet`: rows in Parquet, object stores, clusters (--scheduler)
         "fleet": ["pyarrow>=14", "fsspec>=2023.10", "distributed>=2023.10"],
     },
-    entry_points={
-        "console_scripts": [
-            "frac_accel = frac_accel.cli:main",
-            "corrector = frac_accel.nodes.corrector:main",
-            "diagnoser = frac_accel.nodes.diagnoser:main",
-            "player = frac_accel.nodes.player:main",
-            "recorder = frac_accel.nodes.recorder:main",
-            "virtual_sensor = frac_accel.nodes.virtual_sensor:main",
-        ],
-    },
+    entry_points={"console_scripts": scripts},
 )

@@ -18,6 +18,7 @@ VERBS = {
     "identify": "measured pair -> sensor model with standard uncertainties",
     "validate": "error metrics of a model and of its correction",
     "correct": "raw acceleration -> corrected acceleration",
+    "convert": "between MCAP, sqlite3, CSV, Parquet, MDF4 and numpy",
     "budget": "what is left, parted by kind, in seconds, without naming anything",
     "diagnose": "what a simulation gets wrong, the cause, the extension, the gain",
     "fleet": "many bags through a verb, and what they show together",

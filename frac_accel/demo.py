@@ -19,6 +19,7 @@ from .commands._common import provenance
 from .errors import FracAccelError
 from .identification import identify
 from .io.bag import CORRECTED_TOPIC, RAW_TOPIC, REFERENCE_TOPIC, read_bag
+from .io.shared_files import shared_folder
 from .model import AXES, SensorModel
 from .model.parameters import as_mapping
 from .record import Record
@@ -29,7 +30,7 @@ from .validation import compare
 
 # The axis that the model comes from; it then corrects all three.
 AXIS = "x"
-BAGS = Path(__file__).resolve().parent.parent / "bags"
+BAGS = shared_folder("bags")
 _PATIENCE_S = 90
 # Of the record, in the picture.
 _SHOWN_S = 0.3

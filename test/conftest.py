@@ -1,4 +1,4 @@
-"""Which tests `make check` runs, and which of many draws `make test` spares."""
+"""Which tests `make check` and `colcon test` run, and which of many draws `make test` spares."""
 
 import pytest
 
@@ -16,16 +16,35 @@ SLOW = """
 # Files whose tests draw many records or sensors: `make test` runs the first draw of each test, and
 # `make test-all` the others.
 MANY_DRAWS = """
-    axis_monitors backlash budget changes_in_time corrected_uncertainty core_response
-    corrector_uncertainty diagnosis_data_checks diagnosis_exchanged diagnosis_leftover
-    diagnosis_laws diagnosis_steps diagnosis_stretches diagnosis_truthful domains_agree effects_correction effects_simulation
-    effects_streaming empirical_link further_forces gap_coverage identify_arx
-    identify_auto identify_fractional identify_gain identify_general_equation identify_oscillator
-    identify_records inverse_design linear_causes misalignment output_variance plausibility
-    real_records record_orientation record_pairing reference_faults residual_causes rig_accuracy
-    rig_road rig_second_set rig_uncatalogued simulation_accuracy spring_uncertainty
-    streaming_identity
+    axis_monitors backlash budget changes_in_time core_response corrected_uncertainty
+    corrector_uncertainty diagnosis_data_checks diagnosis_exchanged diagnosis_laws
+    diagnosis_leftover diagnosis_steps diagnosis_stretches diagnosis_truthful domains_agree
+    effects_correction effects_simulation effects_streaming empirical_link further_forces
+    gap_coverage identify_arx identify_auto identify_fractional identify_gain
+    identify_general_equation identify_oscillator identify_records inverse_design linear_causes
+    misalignment output_variance plausibility real_records record_orientation record_pairing
+    reference_faults residual_causes rig_accuracy rig_road rig_second_set rig_uncatalogued
+    simulation_accuracy spring_uncertainty streaming_identity
 """.split()
+
+
+def is_colcon(config):
+    """Whether `colcon test` has called: it names its results after the package."""
+    return config.option.junitprefix == "frac_accel"
+
+
+def pytest_configure(config):
+    """Let `colcon test` run the fast part, unless it is told which."""
+    if is_colcon(config):
+        config.option.markexpr = config.option.markexpr or "fast"
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Of the other files `colcon test` needs no libraries."""
+    if is_colcon(config) and collection_path.suffix == ".py" \
+            and collection_path.stem.removeprefix("test_") not in FAST:
+        return True
+    return None
 
 
 def pytest_collection_modifyitems(items):

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from ..errors import FracAccelError
+from ..identification.checks.record_checks import require_magnitude
 from ..model import AXES
 from ..model.effects.fit_starts import bulk_shift
 from ..record import Record
@@ -73,6 +74,7 @@ def left_by(reference, sensor, model=None, axis="x", noise_std=None, second_sens
     """
     column, words = AXES.index(axis), []
     pair = _record(reference, sensor, axis)
+    require_magnitude(pair, axis)
     words += pair.words
     other_values = None
     if second_sensor is not None:

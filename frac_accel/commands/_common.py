@@ -19,15 +19,16 @@ from ..model.parameters import plain
 from ..record import Temperature
 from ..report import require_plotly
 
+BAG_HELP = ".mcap file or rosbag2 folder, or .db3, .csv, .parquet, .mf4, .npz (see convert)"
 _NUMBERS = re.compile(r"\[([-+.\deEnul,\s]*)\]")
 # Options that name files, of all verbs.
-INPUTS = ("bag", "bags", "model", "result")
+INPUTS = ("bag", "bags", "inputs", "model", "result")
 OUTPUTS = ("output", "extended_model", "report", "json")
 
 
 def add_bag(parser):
     """The bag that a verb reads."""
-    parser.add_argument("bag", metavar="BAG", help="bare .mcap file or rosbag2 folder")
+    parser.add_argument("bag", metavar="BAG", help=BAG_HELP)
 
 
 def add_model(parser):
@@ -172,7 +173,7 @@ def provenance(bag, command):
     """Where a result comes from: the bag, its content's hash, the command and our version."""
     from importlib.metadata import PackageNotFoundError, version
     path = Path(bag)
-    files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+    files = sorted([*path.glob("*.mcap"), *path.glob("*.db3*")]) if path.is_dir() else [path]
     digest = hashlib.sha256()
     for file in files:
         with open_regular(file) as stream:

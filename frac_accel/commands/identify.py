@@ -12,6 +12,7 @@ from ..record import Record
 from ..report.identification import identification_page
 from ..report.quantity import left_open_by
 from ._common import (
+    BAG_HELP,
     add_json,
     add_report,
     add_topics,
@@ -27,7 +28,7 @@ from ._common import (
 
 def add_arguments(parser):
     """Options of the verb."""
-    parser.add_argument("bags", metavar="BAG", nargs="+", help="bare .mcap file or rosbag2 folder")
+    parser.add_argument("bags", metavar="BAG", nargs="+", help=BAG_HELP)
     parser.add_argument("--structure", choices=STRUCTURES, default="auto",
                         help="form of the model; auto chooses on held-out data "
                              "(default: %(default)s)")

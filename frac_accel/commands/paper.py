@@ -20,7 +20,7 @@ def add_arguments(parser):
                         help="tables, figures and audit only, without the study (seconds instead "
                              "of minutes)")
     parser.add_argument("--bags", metavar="FOLDER", default=str(BAGS),
-                        help="folder of the study's bags (default: bags/ of the checkout)")
+                        help="folder of the study's bags (default: %(default)s)")
     add_report(parser)
     add_json(parser)
 

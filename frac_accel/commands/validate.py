@@ -44,6 +44,8 @@ def run(arguments):
     except FracAccelError as error:
         raise type(error)(f"{arguments.bag}: {error}") from None
     print(table(result, arguments.axis))
+    for words in result.words:
+        print(f"data: {words}")
     write_json(arguments.json, result.as_dict())
 
 

@@ -95,7 +95,7 @@ class Engine:
         # what counts in no fit, since a signal was at fault there
         self.aside = np.zeros(len(record), bool)
         self.held_out_rows = self.problem.used & held_out(self.problem.record.reference[:, axis])
-        self._learnt, self._budgets, self._structures = {}, {}, {}
+        self._learnt, self._budgets, self._structures, self._left = {}, {}, {}, {}
         # what the numerics of the simulation may still be wrong by
         self.floor = 3e-5 * float(np.std(record.sensor[used, axis]))
 
@@ -301,15 +301,15 @@ class Engine:
 
     def budget(self, fitted):
         """`Budget` of what a fit leaves, of all samples that are there."""
+        return _once(self._budgets, fitted, self._budget_of)
+
+    def _budget_of(self, fitted):
         p = self.problem
-        if fitted.causes in self._budgets:
-            return self._budgets[fitted.causes]
         residual = np.where(p.record.valid, p.measured - fitted.output, 0.0)
         residual[:p.edge] = residual[len(residual) - p.edge:] = 0.0
         division = self._division
-        self._budgets[fitted.causes] = division.of(*(
-            values[self._parted] for values in (residual, p.measured, fitted.output)))
-        return self._budgets[fitted.causes]
+        return division.of(*(values[self._parted] for values in
+                             (residual, p.measured, fitted.output)))
 
     def structure(self, fitted):
         """Parts of what a fit leaves that are no noise: (share, part), the largest first.
@@ -317,23 +317,24 @@ class Engine:
         What rounding to a coarse lattice makes of the simulated values is taken off: it follows the
         motion.
         """
-        if fitted.causes not in self._structures:
-            parts, step = self.budget(fitted).parts, self.coarse_step(fitted)
-            rounded = {}
-            if step:
-                p = self.problem
-                error = next(rounding_errors(fitted.residual, fitted.output, p.used, step))
-                rounded = {entry["part"]: SCATTER * entry["share"] for entry in self._division.of(
-                    *(values[self._parted] for values in
-                      (error, fitted.output + error, fitted.output))).parts}
-            own = self._passed_on(fitted)
-            shares = [(entry["share"] - rounded.get(entry["part"], 0.0) - own,
-                       entry["ci95"][0] - rounded.get(entry["part"], 0.0) - own, entry["part"])
-                      for entry in parts if entry["part"] != "noise"]
-            self._structures[fitted.causes] = sorted(
-                ((share, part) for share, low, part in shares
-                 if share > _PART and low > _PART_AT_LEAST), reverse=True)
-        return self._structures[fitted.causes]
+        return _once(self._structures, fitted, self._structure_of)
+
+    def _structure_of(self, fitted):
+        parts, step = self.budget(fitted).parts, self.coarse_step(fitted)
+        rounded = {}
+        if step:
+            p = self.problem
+            error = next(rounding_errors(fitted.residual, fitted.output, p.used, step))
+            rounded = {entry["part"]: SCATTER * entry["share"] for entry in self._division.of(
+                *(values[self._parted] for values in
+                  (error, fitted.output + error, fitted.output))).parts}
+        own = self._passed_on(fitted)
+        shares = [(entry["share"] - rounded.get(entry["part"], 0.0) - own,
+                   entry["ci95"][0] - rounded.get(entry["part"], 0.0) - own, entry["part"])
+                  for entry in parts if entry["part"] != "noise"]
+        return sorted(
+            ((share, part) for share, low, part in shares
+             if share > _PART and low > _PART_AT_LEAST), reverse=True)
 
     def unexplained(self, fitted):
         """RMS of what a fit leaves that is no noise, as far as it shows [output units]."""
@@ -455,6 +456,9 @@ class Engine:
 
     def left(self, fitted):
         """What the residual still holds."""
+        return _once(self._left, fitted, self._left_of)
+
+    def _left_of(self, fitted):
         p = self.problem
         across = [signal for axis, signal in enumerate(p.record.reference.T)
                   if axis != p.axis and np.ptp(signal)]
@@ -463,3 +467,11 @@ class Engine:
         own = self._passed_on(fitted)
         return dataclasses.replace(found, linear=max(found.linear - own, 0.0),
                                    level=max(found.level - own, 0.0))
+
+
+def _once(store, fitted, make):
+    """What is made of a fit, again only where its parameters have changed."""
+    known = store.get(fitted.causes)
+    if known is None or known[0] != fitted.cost:
+        known = store[fitted.causes] = fitted.cost, make(fitted)
+    return known[1]

@@ -215,8 +215,8 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
     strange = engine.structure(fitted)
     # beside a model that leaves nothing that stands out, what is only suspected is chance
     plain = not findings and not strange and engine.left(fitted).share == 0
-    verdict = verdict_of(findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
-                         fraction, accounted, strange or faulty)
+    verdict = verdict_of(findings, [] if plain else suspects, complete,
+                         0.0 if plain else left.share, fraction, accounted, strange or faulty)
     effects = {**fitted.effects, **{f.cause: f.effect for f in findings}}
     described, after = _described(engine, fitted, after, {part for _, part in strange}) \
         if verdict in _INCOMPLETE else ({}, after)

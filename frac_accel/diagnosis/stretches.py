@@ -113,12 +113,13 @@ class Stretches(Problem):
         return np.concatenate([part.response(axis) for part in self.parts])
 
     def errors(self, fitted):
-        """As `Problem.errors`, of the whole record: stretches that no fit has seen are simulated."""
+        """As `Problem.errors`, of the whole record, with what no fit has seen."""
         record, used = self._whole
         found = np.full(len(record), np.nan)
         for start in range(0, len(record), _LENGTH):
-            # one that would be short belongs to the one before
-            rows = slice(start, len(record) if len(record) - start < 2 * _LENGTH else start + _LENGTH)
+            # what would be short belongs to the one before
+            is_last = len(record) - start < 2 * _LENGTH
+            rows = slice(start, len(record) if is_last else start + _LENGTH)
             part = Problem(record.part(rows), self.axis, self.baseline, used[rows], self.limit)
             if part.used.any():
                 found[rows] = part.errors(part.fit(fitted.effects, iterations=0))

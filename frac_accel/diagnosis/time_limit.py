@@ -2,12 +2,14 @@
 
 import time
 
+from ..simulation.compiling import compiled_s
+
 # Share of the budget after which nothing new is tried, so that what is known can be judged.
 _SEARCH = 0.75
 
 
 class TimeLimit:
-    """Counts the processor time of this process from its making.
+    """Counts the processor time of this process from its making, but for what compiling takes.
 
     Parameters
     ----------
@@ -22,12 +24,12 @@ class TimeLimit:
 
     def __init__(self, seconds=float("inf")):
         self.seconds = seconds
-        self._start = time.process_time()
+        self._start = time.process_time() - compiled_s()
         self.left_out = []
 
     def spent_s(self):
         """Processor time [s] since the start."""
-        return time.process_time() - self._start
+        return time.process_time() - compiled_s() - self._start
 
     def ends_search(self, words=None):
         """Whether the search must end; notes what is left out because of it."""

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FracAccelError, IdentificationError
+from ..errors import FracAccelError, IdentificationError, ModelError
 from ..io.samples import Samples
+from ..model import SensorModel
 from ..record import Record
 from ..record.sources import is_bag, pair_of
 from .judge.candidate import STRUCTURES as _STRUCTURES
@@ -105,7 +106,18 @@ def identify(pair: Any, axis: str = "x", structure: str = "auto",
         chosen, reason = choose_classical(datas[0])
     else:
         chosen, reason = Candidate.of(structure, datas[0]), "requested"
-    return identification(chosen, reason, datas, records, axis, provenance or {}, agreeing)
+    found = identification(chosen, reason, datas, records, axis, provenance or {}, agreeing)
+    _require_loadable(found.model)
+    return found
+
+
+def _require_loadable(model):
+    """Refuse a model that no file may hold, as stamps make it that are wrong by orders."""
+    try:
+        SensorModel.from_dict(model.to_dict())
+    except ModelError as error:
+        raise IdentificationError(f"what fits best is no sensor: {error}; are the stamps right?") \
+            from None
 
 
 def _is_pair(source):

@@ -7,7 +7,7 @@ import numpy as np
 from ..errors import FracAccelError, ModelError
 from ..model import SensorModel
 from ..model.core import Oscillator
-from ..model.effects import IDENTIFIED, identified_effect
+from ..model.effects import IDENTIFIED, fault_of_reference, identified_effect
 from ..model.parameters import parameter_fields, plain, rebuilt, unit_of
 from ..shown import Shown
 from .evidence import Evidence
@@ -168,7 +168,14 @@ def identification(chosen, reason, datas, records, axis, provenance, agreeing=No
     tests = judge_residual(chosen.structure.core(own), own, data.reference, data.pair)
     validation = fit_validation(tests, own.rmse / data.spread,
                                 chosen.held_out.bands(rate, *excitation.band_hz), agreeing)
-    effects = [identified_effect("delay_s", fit["delay_s"])]
+    delay, faults = identified_effect("delay_s", fit["delay_s"]), []
+    if _is_the_references(parameters["delay_s"], datas):
+        faults = [fault_of_reference(delay)]
+        delay = identified_effect("delay_s", 0.0)
+        notes.append(f"the delay of {fit['delay_s']:.4g} s stands in the model as one of the "
+                     f"reference ({-fit['delay_s']:.4g} s): nothing is taken out of the sensor's "
+                     "stamps")
+    effects = [delay]
     if abs(fit["offset"]) > SIGNIFICANT * parameters["offset"]["std"]:
         effects.append(identified_effect("offset", fit["offset"]))
     model = SensorModel(chosen.structure.core(fit), effects, metadata={
@@ -183,11 +190,17 @@ def identification(chosen, reason, datas, records, axis, provenance, agreeing=No
                        "notes": notes, **validation.essentials()},
         **({"continuous_equivalent": fit.continuous_equivalent()}
            if isinstance(fit, ArxFit) else {}),
-    })
+    }, reference_faults=faults)
     return Identification(model, chosen.name, reason, parameters, chosen.nrmse,
                           chosen.held_out_nrmse, notes, validation,
                           Evidence.of(data, fit.residual), excitation,
                           data.response.points, compared)
+
+
+def _is_the_references(delay, datas):
+    """Whether the sensor shows the motion before the reference, in every record and by the fit."""
+    return delay["value"] < -SIGNIFICANT * delay["std"] \
+        and all(data.pair.is_reference_late for data in datas)
 
 
 def _number(value):

@@ -144,6 +144,19 @@ def together():
         print(words)
 
 
+@contextlib.contextmanager
+def at_once():
+    """Outputs that are made within are put in their places when they are done, even in `together`.
+
+    For files of our own that the same command reads again.
+    """
+    token = _current.set(None)
+    try:
+        yield
+    finally:
+        _current.reset(token)
+
+
 def stage(target):
     """Begin an `Output`.
 
@@ -314,7 +327,7 @@ def _files_of(source):
 
 
 def _is_of_bag(path):
-    return path.suffix in (".mcap", ".yaml")
+    return path.suffix in (".mcap", ".db3", ".yaml")
 
 
 def _identities(path):

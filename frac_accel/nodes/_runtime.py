@@ -27,6 +27,7 @@ from rclpy.signals import SignalHandlerOptions
 from frac_accel.errors import FracAccelError
 from frac_accel.nodes._errors import NodeError
 from frac_accel.nodes._intake import DirectIntake, RawSubscription
+from frac_accel.nodes._service import ServiceManager
 
 # How often services and all that is not taken directly have their turn.
 _EXECUTOR_PERIOD_S = 0.2
@@ -136,7 +137,7 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
     """
     program = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", make_node.__name__).lower()
     node = executor = None
-    stop = _StopSignals()
+    stop, service = _StopSignals(), ServiceManager()
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
@@ -144,6 +145,7 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
         executor = make_executor()
         executor.add_node(node)
         direct, next_s = DirectIntake(node), 0.0
+        service.ready()
         while not (stop.requested or node.done):
             # A bounded wait, because a Python signal handler runs only between two of them.
             if direct.is_possible and node.direct_subscriptions:
@@ -154,6 +156,8 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
             else:
                 executor.spin_once(timeout_sec=node.turn_s)
             node.take_turn()
+            service.alive()
+        service.stopping()
         node.finish()
         return 0
     except FracAccelError as error:

@@ -5,15 +5,15 @@ other numbers are computed.
 """
 
 import dataclasses
-from pathlib import Path
 
+from ..io.shared_files import shared_folder
 from . import curves, models, tables
 from .claims import STATUSES, Claim, audit
 
 __all__ = ["BAGS", "STATUSES", "Claim", "PaperResult", "reproduce"]
 
-# Where the study's bags are in a checkout.
-BAGS = Path(__file__).resolve().parents[2] / "bags"
+# Where the study's bags are.
+BAGS = shared_folder("bags")
 
 # Where a column is one of these its cells are ours, otherwise the paper's.
 _OURS = (tables.REPRODUCED, tables.FOLLOWS, tables.NOT_IN_PAPER)
@@ -54,7 +54,7 @@ def reproduce(study=True, bags=None, progress=None):
     study : bool
         Whether to do the experiment, which takes a minute or two.
     bags : str or Path, optional
-        Folder of the bench's bags; default: that of the checkout.
+        Folder of the bench's bags; default: those that come with the package.
     progress : callable, optional
         Called with a few words before each step, and with the share that is done.
 

@@ -120,6 +120,12 @@ class Record:
             values[:, column] = within(values[:, column], self.sampling_rate_hz, self.band_hz, good)
         return dataclasses.replace(self, reference=reference, sensor=sensor)
 
+    @property
+    def is_reference_late(self):
+        """Whether the sensor shows the motion clearly before the reference does."""
+        return self.offset_s is not None and not self.taken_out_s \
+            and _is_lead(self.offset_s, self.offset_std_s)
+
     @functools.cached_property
     def _topics(self):
         """The topics, or what the record's own arrays give for them."""
@@ -286,10 +292,14 @@ def _offset_words(offset, taken_out):
         later = "ahead of" if offset.seconds > 0 else "behind"
         return [f"the sensor's clock is {size} {later} the reference's, by what both measure: this "
                 "is taken out of its stamps, and no delay of the sensor can be told"]
-    if offset.seconds < -max(_SIGNIFICANT * offset.std_s, _LATE_S):
+    if _is_lead(offset.seconds, offset.std_s):
         return [f"the sensor shows the motion {size} before the reference does, which no sensor "
                 "can: the reference's stamps are late, or the sensor's early"]
     return []
+
+
+def _is_lead(seconds, std_s):
+    return seconds < -max(_SIGNIFICANT * std_s, _LATE_S)
 
 
 def _in_g(step):

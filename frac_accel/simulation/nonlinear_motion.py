@@ -25,6 +25,7 @@ from numba import types
 
 from ..model.core.bouc_wen import follow_one_way
 from ..model.core.static_force import no_force
+from . import compiling
 
 # Iterations of a step at most, and the change of the force at which they end.
 _PASSES = 40
@@ -35,6 +36,7 @@ _TURN_PASSES = 4
 _TURNED = 1e-4          # of a step, the permitted error of a turn
 _HALVINGS, _SECANTS = 5, 3  # of a step where a turn is looked for
 
+compiling.watch()
 _fast = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})
 _exact = numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
 _inlined = numba.njit(cache=True, error_model="numpy", inline="always", fastmath={"contract"})

@@ -59,12 +59,15 @@ class Validation(Shown):
         Summary of the inverse filters.
     counters : dict of str to int
         Fate of the samples.
+    words : tuple of str
+        What was done to put reference and sensor together: rates, band, offset of the clocks.
     """
 
     simulation: ErrorMetrics
     comparison: Comparison
     filters: dict
     counters: dict
+    words: tuple = ()
 
     def __repr__(self):
         return (f"<Validation: simulation {self.simulation.total.nrmse:.3%}, correction "
@@ -88,7 +91,7 @@ class Validation(Shown):
         return {"simulation": self.simulation.as_dict(),
                 **{name: getattr(self.comparison, name).as_dict()
                    for name in ("raw", "scaled", "corrected")},
-                "filters": self.filters, "counters": self.counters}
+                "filters": self.filters, "counters": self.counters, "words": list(self.words)}
 
 
 def validate(source: Any, model: SensorModel, axis: str = "x",
@@ -144,7 +147,8 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     measured, simulated = _simulated(model, pair, AXES.index(axis), temperature_at)
     return Validation(
         simulation=error_metrics(measured, simulated, pair.sampling_rate_hz, bands),
-        comparison=comparison, filters=corrector.design.summary(), counters=corrector.counters)
+        comparison=comparison, filters=corrector.design.summary(), counters=corrector.counters,
+        words=pair.words)
 
 
 def compare(reference, sensor, corrected, design, axis="x"):

@@ -1,4 +1,4 @@
-"""Laws of force and filters that no cause says, and noise of the reference: no name stands for them.
+"""Laws of force and filters that no cause says, and noise of the reference: no name is theirs.
 
 The equation of motion is integrated here by Runge and Kutta's rule at 20 times the sampling rate.
 """

@@ -66,7 +66,8 @@ def test_stretches_are_simulated_as_the_whole_record_is(seed):
     rng, motion, _ = drive(seed)
     pair = pair_of((motion, motion), RATE, "x", "", "")
     record = Record.of(*pair, "x", None)
-    own = frac_accel.SensorModel(Oscillator(rng.uniform(8, 20), rng.uniform(0.4, 0.8), sensitivity=1.0))
+    own = frac_accel.SensorModel(
+        Oscillator(rng.uniform(8, 20), rng.uniform(0.4, 0.8), sensitivity=1.0))
     used = np.ones(len(record), bool)
     whole = Problem(record, 0, own, used)
     parts = stretches.Stretches(record, 0, own, used, None, stretches.stretches_of(record, 0))

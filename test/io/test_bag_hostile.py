@@ -274,7 +274,7 @@ INFORMATION = "rosbag2_bagfile_information:\n  relative_file_paths: [a.mcap]\n"
         (content(b""), "is empty"),
         (content(b"hello world, this is no bag"), "not an MCAP file"),
         (content(b"#ROSBAG V2.0\n" + bytes(100)), "ROS 1"),
-        (content(b"SQLite format 3\0" + bytes(100)), "sqlite3"),
+        (content(b"SQLite format 3\0" + bytes(100)), "sqlite3|library rosbags"),
         (content(MAGIC), "nothing is readable"),
         (content(MAGIC + MAGIC), "nothing is readable"),
         (foreign(profile="ros1"), "profile 'ros1', expected 'ros2'"),

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from frac_accel.cli import main
 from frac_accel.model import SensorModel
 
 ROOT = Path(__file__).parents[2]
@@ -72,6 +73,35 @@ def test_nodes_are_where_ros2_run_looks_and_only_the_command_is_on_path(installe
     assert [path.name for path in (installed / "bin").iterdir()] == ["frac_accel"]
 
 
+def collected(*options):
+    """Identifiers of the tests that pytest would run."""
+    shown = run([sys.executable, "-m", "pytest", "-q", "--collect-only", "-n", "0", *options])
+    return [line for line in shown.stdout.splitlines() if "::" in line]
+
+
+def test_colcon_test_is_given_the_fast_part_of_the_suite():
+    fast = collected("-m", "fast")
+    assert len(fast) > 500
+    assert collected("--junit-prefix=frac_accel") == fast
+
+
+@pytest.mark.ros
+def test_colcon_test_runs_tests(installed):
+    """A few of them, as `colcon test` finds them by `extras_require`; their number is told."""
+    folder = installed.parents[1]
+    result = run(
+        [Path(sys.prefix, "bin", "colcon"), "--log-base", folder / "log", "test",
+         "--build-base", folder / "build", "--install-base", folder / "install",
+         "--pytest-args", "-k", "test_timing"],
+        env=os.environ | {"AMENT_PREFIX_PATH": sys.prefix})
+    assert result.returncode == 0, result.stdout + result.stderr
+    suite = xml.etree.ElementTree.parse(
+        folder / "build" / "frac_accel" / "pytest.xml").getroot().find("testsuite")
+    expected = collected("-m", "fast", "-k", "test_timing")
+    assert int(suite.get("tests")) == len(expected) > 0
+    assert suite.get("failures") == suite.get("errors") == "0"
+
+
 @pytest.mark.ros
 def test_command_runs_from_the_workspace(installed):
     result = start(installed, "frac_accel --help")
@@ -126,6 +156,31 @@ def test_numerical_code_imports_no_ros():
     packages = imported_by(modules)
     assert "numpy" in packages
     assert not packages & ({"rclpy", "sensor_msgs", "std_msgs"} | ros_packages())
+
+
+def needed():
+    """Keys that package.xml asks `rosdep` for."""
+    root = xml.etree.ElementTree.parse(ROOT / "package.xml").getroot()
+    return {element.text for element in root if element.tag.endswith("depend")}
+
+
+def test_rosdep_knows_every_key():
+    known = yaml.safe_load((ROOT / "test" / "package" / "rosdep_keys.yaml").read_text())
+    assert needed() <= {*known["keys"], *known["jazzy"]}
+
+
+def test_every_library_has_its_key_or_is_asked_for_in_one_line(capsys, monkeypatch):
+    about = importlib.metadata.requires("frac_accel")
+    libraries = {re.match(r"[\w.-]+", line)[0] for line in about if "extra ==" not in line}
+    keys = yaml.safe_load(
+        (ROOT / "test" / "package" / "rosdep_keys.yaml").read_text())["libraries"]
+    assert libraries == set(keys)
+    assert {key for key in keys.values() if key} <= needed()
+    for library in (name for name, key in keys.items() if not key):
+        monkeypatch.setitem(sys.modules, library, None)
+        assert main(["diagnose", "none.mcap", "--report", "report.html"]) == 2
+        line, = capsys.readouterr().err.splitlines()
+        assert f"pip install {library}" in line
 
 
 def declared_arguments(tree, function):
@@ -211,7 +266,6 @@ def test_layouts_plot_raw_reference_and_corrected():
 
 def test_version_is_the_same_everywhere():
     version = xml.etree.ElementTree.parse(ROOT / "package.xml").findtext("version")
-    assert f'version="{version}"' in (ROOT / "setup.py").read_text()
     assert f"\n{version} (" in (ROOT / "CHANGELOG.rst").read_text()
 
 

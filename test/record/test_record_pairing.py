@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from frac_accel import SensorModel, diagnose, identify
 from frac_accel.errors import FracAccelError
 from frac_accel.io.samples import Samples
-from frac_accel.model.core import Oscillator
+from frac_accel.model.core import Gain, Oscillator
 from frac_accel.record import Record
 from frac_accel.validation import validate
 
@@ -313,3 +313,72 @@ def test_what_the_slower_topic_cannot_show_bends_no_fit():
     moved = diagnosed(0.25)
     assert [finding.cause for finding in moved.findings] == ["core_parameter_shift"]
     assert abs(moved.findings[0].effect.damping_ratio / 0.3 - 1) < 0.01
+
+
+def at_two_clocks(topics, offset_s):
+    """Topics with the sensor's clock ahead by so much."""
+    reference, sensor = topics
+    return reference, sensor._replace(stamps_ns=sensor.stamps_ns + round(offset_s * 1e9))
+
+
+@pytest.mark.parametrize("rates, offset_s", [((100.0, 400.0), 12.34), ((400.0, 100.0), -7.77),
+                                             ((200.0, 201.0), 86400.0)])
+def test_a_sensor_is_identified_and_judged_across_clocks(rates, offset_s):
+    """Seconds between the clocks are taken out, whatever the rates; the band is stated."""
+    sensor, topics = two_devices(3, *rates)
+    pair = at_two_clocks(topics, offset_s)
+    found = identify(pair, structure="oscillator")
+    for name in ("natural_frequency_hz", "damping_ratio", "sensitivity"):
+        assert found.parameters[name]["value"] == pytest.approx(sensor.core[name], rel=5e-3)
+    judged = validate(pair, found.model)
+    assert judged.simulation.total.nrmse < 0.01
+    assert judged.comparison.corrected.total.nrmse < 0.03
+    for words in (found.notes, judged.words):
+        assert any("clock is" in line and "taken out" in line for line in words)
+        band, = (float(re.search(r"up to (\S+) Hz", line)[1]) for line in words
+                 if "compared at" in line)
+        assert band == pytest.approx(0.4 * min(rates), rel=6e-3)
+
+
+def test_a_bus_and_a_phone():
+    """10 Hz against 14 Hz, clocks that differ by seconds, a flat sensor."""
+    rng = np.random.default_rng(20261122)
+    motion = multisine(rng, 2.0, 40)
+    t, s = np.arange(3000) / 10, np.arange(4200) / 14
+    answer = 1.03 * motion(s)
+    answer += 0.01 * answer.std() * rng.normal(size=len(s))
+    pair = samples(t, motion(t)), samples(s + 3.21, answer)
+    found = identify(pair, structure="gain")
+    assert found.parameters["sensitivity"]["value"] == pytest.approx(1.03, rel=2e-3)
+    assert abs(found.parameters["delay_s"]["value"]) < 0.01
+    assert any("3.21" in note and "taken out" in note for note in found.notes)
+    assert validate(pair, found.model).comparison.corrected.total.nrmse < 0.02
+    assert diagnose(pair, found.model).findings == []
+    wrong = diagnose(pair, SensorModel(Gain(0.9)))
+    finding, = wrong.findings
+    assert finding.cause == "sensitivity_error"
+    assert finding.effect.gain == pytest.approx(1.03 / 0.9, rel=3e-3)
+    for words in (found.notes, wrong.integrity.words, validate(pair, found.model).words):
+        assert any("clock is 3.2" in line and "taken out" in line for line in words)
+        assert any("up to 4 Hz" in line for line in words)
+
+
+@pytest.mark.parametrize("rates", [(100.0, 400.0), (200.0, 200.0)])
+def test_a_late_reference_is_put_on_no_sensors_stamps(rates, tmp_path):
+    """As of a CAN bus: the sensor seems to lead by 80 ms."""
+    sensor, (reference, raw) = two_devices(4, *rates)
+    late = reference._replace(stamps_ns=reference.stamps_ns + 80_000_000)
+    found = identify((late, raw), structure="oscillator")
+    lead = 0.08 - sensor.effects["time_delay"]["delay_s"]
+    fault, = found.model.reference_faults
+    assert fault.delay_s == pytest.approx(lead, abs=1e-4)
+    assert found.model.axis("x").delay_s == 0
+    assert any("nothing is taken out of the sensor's stamps" in note for note in found.notes)
+    found.model.save(tmp_path / "model.yaml")
+    again = SensorModel.load(tmp_path / "model.yaml")
+    judged = validate((late, raw), again)
+    assert judged.simulation.total.nrmse < 0.01
+    assert judged.comparison.corrected.total.nrmse < 0.03
+    # without its fault the reference and the corrected signal agree only at one time in the right
+    assert validate((reference, raw), SensorModel(again.axis("x").core)
+                    ).comparison.corrected.total.nrmse < 0.1

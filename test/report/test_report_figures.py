@@ -7,6 +7,8 @@ import pytest
 
 from frac_accel.report import Page, figures
 
+pytest.importorskip("plotly", reason="figures of reports are drawn by plotly")
+
 
 @pytest.mark.parametrize("n", [7, 4000, 4001, 123_457, 1_000_000])
 def test_envelope_keeps_the_extremes_of_every_stretch(n):

@@ -10,6 +10,8 @@ import pytest
 from frac_accel.errors import FracAccelError
 from frac_accel.report import Page, figures
 
+pytest.importorskip("plotly", reason="figures of reports are drawn by plotly")
+
 HOSTILE = "</script><script>alert('x')</script> & \"quoted\" $title"
 LINE = np.arange(3.0)
 

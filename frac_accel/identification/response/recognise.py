@@ -76,7 +76,7 @@ def recognise(reference, sampling_rate_hz):
     if _one_short_event(moving):
         return Recognised("shock", f"shock at {_peak(moving) / sampling_rate_hz:.4g} s")
     tones, energy = _tones(moving, sampling_rate_hz)
-    tonal = energy >= _TONAL * np.sum(moving**2)
+    tonal = bool(tones) and energy >= _TONAL * np.sum(moving**2)
     if tonal and _stepped(tones, sampling_rate_hz):
         tones = _joined(tones, sampling_rate_hz)
         frequencies = [tone.frequency_hz for tone in tones]

@@ -1,4 +1,7 @@
-"""Which MCAP files make up a bag: a bare file, or a rosbag2 folder with its metadata.yaml."""
+"""Which MCAP files make up a bag: a bare file, or a rosbag2 folder with its metadata.yaml.
+
+Files of other formats are made MCAP first (`frac_accel.io.formats`).
+"""
 
 from __future__ import annotations
 
@@ -19,8 +22,10 @@ def bag_files(path: Path) -> tuple[list[Path], list[str]]:
     A folder without a usable metadata.yaml (its recorder was killed) is read by file name.
     Names in the metadata are taken as names in the folder: nothing outside it is opened.
     """
+    from frac_accel.io.formats import as_mcap
     if not path.exists():
         raise BagError(f"{path}: no such bag")
+    path = as_mcap(path)
     if not path.is_dir():
         return [path], []
     metadata = path / METADATA_NAME
@@ -36,13 +41,11 @@ def bag_files(path: Path) -> tuple[list[Path], list[str]]:
         return found, [f"{metadata}: is damaged; files are read by name"]
     storage = information.get("storage_identifier")
     if storage != "mcap":
-        raise BagError(
-            f"{path}: storage is '{storage}', expected 'mcap'; convert it (ros2 bag convert)"
-        )
+        raise BagError(f"{path}: storage is '{storage}', expected 'mcap' or 'sqlite3'")
     if information.get("compression_mode"):
         raise BagError(
-            f"{path}: is compressed by rosbag2 (mode '{information['compression_mode']}'); "
-            "decompress it first (ros2 bag convert)"
+            f"{path}: is compressed by rosbag2 (mode '{information['compression_mode']}'), but its "
+            "files do not look so; convert it first (ros2 bag convert)"
         )
     files, warnings = [], []
     for name in information["relative_file_paths"]:

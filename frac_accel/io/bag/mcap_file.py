@@ -44,7 +44,6 @@ _RECORD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")
 _FOREIGN_MAGIC = {
     b"#ROSBAG": "is a ROS 1 bag; convert it first (rosbags-convert)",
-    b"SQLite": "is an sqlite3 bag; convert it to mcap first (ros2 bag convert)",
     b"\x28\xb5\x2f\xfd": "is compressed as a file; decompress it first (zstd -d)",
 }
 _MESSAGE_HEADER = np.dtype(
@@ -149,7 +148,8 @@ class McapFile:
             for magic, meaning in _FOREIGN_MAGIC.items():
                 if head.startswith(magic):
                     raise BagError(f"{self.path}: {meaning}")
-            raise BagError(f"{self.path}: not an MCAP file (wrong magic)")
+            raise BagError(f"{self.path}: not an MCAP file (wrong magic), nor of a format that "
+                           "frac_accel convert reads (db3, csv, parquet, mf4, npz)")
         loose = _LooseRun(self)
         position, in_summary, has_header = len(MAGIC), False, False
         while True:

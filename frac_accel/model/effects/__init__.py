@@ -4,6 +4,7 @@ Third parties add theirs through the entry-point group ``frac_accel.effects``: t
 the cause, its value a subclass of `Effect`. It is loaded when a model or a diagnosis asks for it.
 """
 
+import dataclasses
 import functools
 import importlib
 import pkgutil
@@ -13,7 +14,8 @@ from ...errors import ModelError
 from .base import Circumstances, Effect
 
 __all__ = ["IDENTIFIED", "Circumstances", "Effect", "broken_extensions", "effect_names",
-           "effect_of", "forget_extensions", "identified_effect", "known_effects"]
+           "effect_of", "fault_of_reference", "forget_extensions", "identified_effect",
+           "known_effects"]
 
 
 @functools.cache
@@ -95,3 +97,11 @@ IDENTIFIED = {effect.identified_as: effect for effect in _own().values() if effe
 def identified_effect(parameter, value):
     """Effect that states what ``identify`` found beside a core, such as ``delay_s``."""
     return IDENTIFIED[parameter](value)
+
+
+def fault_of_reference(effect):
+    """The reference's fault that a record cannot tell from an effect of the sensor, or None."""
+    for fault in _own().values():
+        if fault.of_reference and fault.mirrors == effect.cause:
+            return fault(*(-value for value in dataclasses.astuple(effect)))
+    return None

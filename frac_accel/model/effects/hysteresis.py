@@ -6,7 +6,6 @@ from ..parameters import parameter
 from .base import CORE, Effect, require_oscillator
 from .fit_starts import positive
 
-
 # Times that -gamma may exceed beta: beyond it the branches only bend.
 _BENDS = 3.0
 

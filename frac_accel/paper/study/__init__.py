@@ -77,7 +77,7 @@ def run_study(bags=None, progress=lambda words, share: None):
     Parameters
     ----------
     bags : str or Path, optional
-        Folder of the bench's bags; default: that of the checkout.
+        Folder of the bench's bags; default: those that come with the package.
     progress : callable
         Called with a few words and the share that is done.
 
