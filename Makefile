@@ -1,5 +1,5 @@
-# make setup | demo | check | test | test-all | lint | types | bench | soak | blind | fuzz |
-#      docs | browser | pins | clean
+# make setup | demo | check | test | test-all | lint | types | bench | bench-fleet | soak | blind |
+#      fuzz | docs | browser | pins | clean
 # Needs Python 3.10 to 3.13, git and make. PYTHON=python3.12 chooses the Python of .venv.
 
 # A ROS that is sourced, or another venv with ROS, must not leak into ours.
@@ -7,7 +7,7 @@ unexport PYTHONPATH LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DELETE_ON_ERROR:
-.PHONY: setup demo docs check test test-all test-others test-oldest lint types bench soak blind fuzz browser pins clean FORCE
+.PHONY: setup demo docs check test test-all test-others test-oldest lint types bench bench-fleet soak blind fuzz browser pins clean FORCE
 
 venv := .venv
 oldest := .venv-oldest
@@ -72,6 +72,17 @@ types: $(venv)/.done
 bench: setup
 	$(python) -m frac_accel.cli bench --json bench.json
 	$(python) benchmarks
+
+# Hours: 10 000 bags with workers killed at random, weak effects in 100 fleets, changes in 200
+# drives, 100 healthy hours. BENCH_FLEET="fleet_bench pooling --draws 5" for a part of it.
+bench-fleet: export OPENBLAS_NUM_THREADS := 1
+bench-fleet: setup
+ifdef BENCH_FLEET
+	PYTHONPATH=test:. $(python) -m $(BENCH_FLEET)
+else
+	for part in "fleet_bench workers" "fleet_bench pooling" "monitoring_bench drives" \
+	    "monitoring_bench healthy"; do PYTHONPATH=test:. $(python) -m $$part || exit; done
+endif
 
 # MINUTES=2 for a shorter one; SOAK="--rate 2000 --restart 8" with publishers that come and go.
 soak: setup

@@ -9,7 +9,7 @@ from setuptools import find_packages, setup
 PACKAGE = "frac_accel"
 # colcon may run this through a link from elsewhere
 ROOT = Path(__file__).resolve().parent
-NODES = ("corrector", "managed_corrector", "player", "recorder", "virtual_sensor")
+NODES = ("corrector", "diagnoser", "managed_corrector", "player", "recorder", "virtual_sensor")
 
 
 def shared(folder, pattern="*"):
@@ -74,6 +74,8 @@ setup(
         "test": ["pytest", "pytest-timeout", "rosbags"],  # the fast part of the suite
         "watch": ["rich"],  # the live table of `frac_accel watch`; rosdep key python3-rich
         "completion": ["shtab>=1.9.2"],  # makes completion scripts of argparse, also for fish
+        # `frac_accel fleet`: rows in Parquet, object stores, clusters (--scheduler)
+        "fleet": ["pyarrow>=14", "fsspec>=2023.10", "distributed>=2023.10"],
     },
     entry_points={"console_scripts": scripts},
 )

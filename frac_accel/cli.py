@@ -21,6 +21,7 @@ VERBS = {
     "convert": "between MCAP, sqlite3, CSV, Parquet, MDF4 and numpy",
     "budget": "what is left, parted by kind, in seconds, without naming anything",
     "diagnose": "what a simulation gets wrong, the cause, the extension, the gain",
+    "fleet": "many bags through a verb, and what they show together",
     "report": "the page of a diagnosis again, from its result file",
     "watch": "live in the terminal: RMS, rate, latency and verdict of each sensor",
     "layout": "a layout for Foxglove or PlotJuggler, with the corrected samples' band",
@@ -44,8 +45,9 @@ def main(arguments=None):
     int
         Exit status: 0 done, whatever the verdict; 2 bad input, or files that cannot be read or
         written, with one line that says what; 3 an error that nobody has foreseen, with one line
-        that says where its details are; 128 and the signal's number if it was stopped. Unless it
-        is 0, no output was written.
+        that says where its details are; 4 where some bags of a fleet failed and the others are
+        done; 128 and the signal's number if it was stopped. Unless it is 0 or 4, no output was
+        written, but for the rows of a fleet's bags that were done.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     if not arguments:
@@ -76,21 +78,21 @@ def main(arguments=None):
 
 def _run(chosen, module, arguments):
     from .commands._common import guard_files
-    status = 2
     try:
         with stopping_cleanly(), together():
             guard_files(chosen)
-            module.run(chosen)
+            status = module.run(chosen) or 0
             sys.stdout.flush()
         sys.stdout.flush()
-        return 0
+        return status
     except FracAccelError as error:
-        words = str(error)
+        words, status = str(error), 2
     except OSError as error:
+        status = 2
         words = ": ".join(str(part) for part in (error.filename, error.strerror or error)
                           if part is not None)
     except MemoryError:
-        words = "there is not enough memory for this input"
+        words, status = "there is not enough memory for this input", 2
     except KeyboardInterrupt:
         words, status = "interrupted", 130
     except Stopped as stopped:

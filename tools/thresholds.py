@@ -11,7 +11,7 @@ PAGE = ROOT / "docs" / "thresholds.md"
 # diagnosis and budget have their table, with reasons, in docs/diagnosis.md; a cause's own numbers
 # are its own
 ROOMS = ("record", "identification", "simulation", "correction", "streaming", "uncertainty",
-         "signals")
+         "signals", "monitoring", "fleet")
 HEAD = """# Thresholds
 
 Every named number of the rooms that decide something, with the comment of its file; values with a

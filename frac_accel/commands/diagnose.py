@@ -45,6 +45,9 @@ def add_arguments(parser):
     parser.add_argument("--time-limit", type=positive, default=60.0, metavar="SECONDS",
                         help="processor time after which the search ends and says what it left "
                              "out (default: %(default)g)")
+    parser.add_argument("--screened", action="store_true",
+                        help="also say in the JSON what each cause would be on its own, to first "
+                             "order, with its uncertainty: what fleet pools over many bags")
     add_report(parser)
     add_json(parser)
 
@@ -64,7 +67,8 @@ def run(arguments):
     with share_done() as show:
         found = diagnose(arguments.bag, model, arguments.axis, temperature, arguments.reference,
                          arguments.sensor, show,
-                         arguments.noise_std, arguments.time_limit)
+                         arguments.noise_std, arguments.time_limit,
+                         screening=arguments.screened)
     print(table(found, arguments.axis))
     command = f"frac_accel diagnose {arguments.bag} --axis {arguments.axis}" + (
         f" --model {arguments.model}" if arguments.model else "")

@@ -29,6 +29,7 @@ from .finding import Diagnosis, Finding, insufficient
 from .flat import flat_instead
 from .judgement import judge
 from .leftover import related
+from .screened import screened
 from .spikes import spikes
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
 from .stretches import MOST
@@ -53,7 +54,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
              temperature: tuple | None = None, reference: str = REFERENCE_TOPIC,
              sensor: str = RAW_TOPIC, progress: Callable | None = None,
              noise_std: float | None = None, time_limit_s: float = float("inf"),
-             sampling_rate_hz: float | None = None) -> Diagnosis:
+             sampling_rate_hz: float | None = None, screening: bool = False) -> Diagnosis:
     """Find what a simulation gets wrong, and why.
 
     Parameters
@@ -75,6 +76,8 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         Budget of processor time [s]; what it leaves out is said in `Diagnosis.cut_off`.
     sampling_rate_hz : float, optional
         Of arrays [Hz].
+    screening : bool
+        Also tell what each cause would be on its own, to first order (`Diagnosis.screened`).
 
     Returns
     -------
@@ -152,8 +155,8 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     _require_relation(engine, axis, seed)
     best = engine.run(seed)
     stages.enter("judging what was found", JUDGED)
-    return judge(engine, best, found, shown, loose, source[1],
-                 noise_std)
+    judged = judge(engine, best, found, shown, loose, source[1], noise_std)
+    return dataclasses.replace(judged, screened=screened(engine)) if screening else judged
 
 
 def _in_axes_of_reference(record, source, axis, temperature, model):

@@ -80,6 +80,9 @@ class Diagnosis(Shown):
         ``part``, ``of`` (baseline or extended), ``share`` of what is left, and its ``ci95``.
     evidence : Evidence or None
         What it rests on, for its page; None where nothing was fitted.
+    screened : dict or None
+        Where asked for, ``estimates`` of every cause on its own beside the model in use, to first
+        order, and the ``correlations`` of their effects (`Screen`): for pooling over many records.
     """
 
     verdict: str
@@ -96,6 +99,7 @@ class Diagnosis(Shown):
         default_factory=lambda: {"rms": None, "by": None})
     cut_off: str | None = None
     budget: list = dataclasses.field(default_factory=list)
+    screened: dict | None = None
 
     def __repr__(self):
         causes = ", ".join(finding.cause for finding in self.findings)
@@ -118,7 +122,8 @@ class Diagnosis(Shown):
                 "data": {key: value for key, value in dataclasses.asdict(self.integrity).items()
                          if key != "words"},
                 "sensor_model": self.model.to_dict() if self.model is not None else None,
-                "evidence": self.evidence.as_dict() if self.evidence is not None else None}
+                "evidence": self.evidence.as_dict() if self.evidence is not None else None,
+                **({"screened": self.screened} if self.screened is not None else {})}
 
     @classmethod
     def from_dict(cls, data):

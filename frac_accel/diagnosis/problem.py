@@ -246,7 +246,7 @@ class Problem:
                   if not acts_on_spring(other) and name != cause}
         model = self.axis_model(linear)
         if acts_on_spring(effect) and type(effect).base_gain is Effect.base_gain:
-            motion = self._motion({name: other for name, other in effects.items() if name != cause})
+            motion = self.motion({name: other for name, other in effects.items() if name != cause})
             added = self.force(model, effect, motion)
             if cause in effects:
                 added = added - self.force(model, effects[cause], motion)
@@ -265,7 +265,7 @@ class Problem:
         from .first_order import force_response
         return force_response(model, effect, motion, self.rate, self.record.lag_s)
 
-    def _motion(self, effects):
+    def motion(self, effects):
         """Motion of the mass with these causes, shape (n,) [output units]; the last one is kept."""
         model = self.axis_model(effects)
         model = AxisModel(model.core, tuple(e for e in model.effects if e.stage <= CORE))

@@ -45,7 +45,8 @@ def _diagnosis(data):
         _numbers({key: data["extended"][key] for key in ("rmse", "nrmse")}),
         _number(data["unexplained_fraction"]), model,
         Integrity(**data["data"], words=data["integrity"]), evidence,
-        data["established_noise"], data["cut_off"], data["budget"])
+        data["established_noise"], data["cut_off"], data["budget"],
+        data.get("screened"))
 
 
 def _finding(entry, known):

@@ -301,3 +301,23 @@ def lines(x, series, x_label, y_label, band=None, points=None, log=""):
     if "y" in log:
         figure.update_yaxes(type="log")
     return panels.finished(figure)
+
+
+def by_date(points):
+    """Errors of many bags by date, a colour for each verdict.
+
+    Parameters
+    ----------
+    points : list of dict
+        ``start_ns``, ``nrmse``, ``verdict``, ``bag``; and ``page``, which a click opens, or None.
+    """
+    figure = panels.rows(1, 420, "date", ["error / output"], x_type="date")
+    figure.update_yaxes(type="log", tickformat=".2~%")
+    for colour, verdict in zip(SERIES, sorted({str(point["verdict"]) for point in points})):
+        mine = [point for point in points if str(point["verdict"]) == verdict]
+        panels.add(
+            figure, 1, mode="markers", name=verdict.replace("_", " "), marker={"color": colour},
+            x=[np.datetime64(point["start_ns"], "ns").astype(str) for point in mine],
+            y=[point["nrmse"] for point in mine], text=[point["bag"] for point in mine],
+            customdata=[point["page"] or "" for point in mine])
+    return panels.finished(figure)

@@ -5,6 +5,7 @@ import html
 import json
 from pathlib import Path
 from string import Template
+from urllib.parse import quote
 
 from ..errors import FracAccelError
 from ..io.outputs import write_text
@@ -156,8 +157,21 @@ class Section:
             f'<div class="scroll"><table>\n<caption>{self._label("table", caption)}</caption>\n'
             f"<thead>{line('th', headers)}</thead>\n<tbody>\n{body}\n</tbody></table></div>")
 
+    def linked_table(self, headers, rows, caption=""):
+        """Add a table whose first column is of pairs: words, and the file they link to or None.
+
+        Files are named from the page's own folder.
+        """
+        plain = [[row[0][0], *row[1:]] for row in rows]
+        self.table(headers, plain, caption)
+        for words, file in {row[0] for row in rows if row[0][1]}:
+            text = html.escape(_cell(words))
+            self._parts[-1] = self._parts[-1].replace(
+                f">{text}</td>", f'><a href="{html.escape(quote(file))}">{text}</a></td>')
+        return self
+
     def figure(self, figure, caption=""):
-        """Add an interactive figure.
+        """Add an interactive figure. A click on a point with ``customdata`` opens that file.
 
         Parameters
         ----------

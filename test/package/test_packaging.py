@@ -23,7 +23,7 @@ from frac_accel.model import SensorModel
 from frac_accel.report import layouts
 
 ROOT = Path(__file__).parents[2]
-NODES = ("corrector", "managed_corrector", "player", "recorder", "virtual_sensor")
+NODES = ("corrector", "diagnoser", "managed_corrector", "player", "recorder", "virtual_sensor")
 
 
 def run(command, **kwargs):

@@ -1,0 +1,152 @@
+"""A fleet finds what no single bag shows, and next to nothing that is not there."""
+
+import fleet_rig
+import numpy as np
+import pytest
+from scipy.stats import false_discovery_control
+
+from frac_accel.fleet.false_discoveries import discoveries
+from frac_accel.fleet.groups import ALL, groups_of
+from frac_accel.fleet.pooled import Estimates, common_causes, odd_vehicles, weak_effects
+from frac_accel.fleet.random_effects import pool
+from frac_accel.model import SensorModel
+
+VEHICLES, WEAK = 70, 30
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.5, 3.0])
+def test_the_mean_of_a_group_lies_in_its_interval(spread):
+    rng = np.random.default_rng(3)
+    draws, inside, found = 600, 0, []
+    for _ in range(draws):
+        stds = rng.uniform(0.3, 2.0, 12)
+        values = rng.normal(1.7, np.hypot(stds, spread))
+        pooled = pool(values, stds)
+        inside += pooled.low <= 1.7 <= pooled.high
+        found.append(pooled.spread)
+    # three standard errors of a share below 95 %; the factor not below one makes it cover more
+    assert inside / draws > 0.95 - 3 * np.sqrt(0.05 * 0.95 / draws)
+    assert np.median(found) == pytest.approx(spread, rel=0.2, abs=0.4)
+
+
+def test_p_values_of_no_effect_are_no_smaller_than_chance():
+    rng = np.random.default_rng(4)
+    p_values = []
+    for _ in range(2000):
+        stds = rng.uniform(0.3, 2.0, 10)
+        p_values.append(pool(rng.normal(0.0, np.hypot(stds, 0.5)), stds).p_value)
+    for level in (0.01, 0.1):
+        assert np.mean(np.array(p_values) < level) < level + 3 * np.sqrt(level / 2000)
+
+
+@pytest.mark.parametrize("method, dependent", [("by", True), ("bh", False)])
+def test_discoveries_are_those_of_scipy(method, dependent):
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        p_values = np.r_[rng.random(200), rng.random(30) * 10**rng.uniform(-8, -2)]
+        expected = false_discovery_control(p_values, method=method) <= 0.01
+        assert list(discoveries(p_values, 0.01, dependent)) == list(expected)
+    with_gap = np.r_[np.nan, 1e-9, np.nan]
+    assert list(discoveries(with_gap, 0.01)) == [False, True, False]
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    model = SensorModel.from_dict(fleet_rig.model())
+    rng = np.random.default_rng(17)
+    causes = ["cubic_stiffness", "sensitivity_error", "gain_drift"]
+    vehicles = [fleet_rig.vehicle(rng, causes if i < WEAK else (), 3.0) for i in range(VEHICLES)]
+    return [fleet_rig.ScreenedVehicle(own, model) for own in vehicles]
+
+
+def test_first_order_estimates_are_the_parameters_that_the_rig_had():
+    model, size = SensorModel.from_dict(fleet_rig.model()), 2e-3
+    own = fleet_rig.vehicle(np.random.default_rng(6), fleet_rig.CAUSES, 3.0)
+    screened = fleet_rig.ScreenedVehicle(own, model)
+    for cause, parameters in fleet_rig.CAUSES.items():
+        [(name, value)] = parameters(size).items()
+        without = parameters(0.0)[name]
+        before, after = (screened.drawn(np.random.default_rng(1), cause, scale)["estimates"]
+                         for scale in (0.0, size))
+        [change] = [b["value"] - a["value"] for a, b in zip(before, after)
+                    if (a["cause"], a["parameter"]) == (cause, name)]
+        # at 500 Hz the turns of the motion, at which friction changes its sign, lie between samples
+        rel = 0.15 if cause == "coulomb_friction" else 0.02
+        assert change == pytest.approx(value - without, rel=rel), cause
+
+
+def lots(seed):
+    """Groups: a lot with the vehicles in which something may be hidden, and columns of chance."""
+    rng = np.random.default_rng(seed)
+    return groups_of({
+        "lot": ["B" if i < WEAK else "A" if i % 2 else "C" for i in range(VEHICLES)],
+        "firmware": [f"{v}" for v in rng.integers(1, 4, VEHICLES)],
+        "mileage": [f"{v:.0f}" for v in rng.uniform(1e3, 1e5, VEHICLES)]}, VEHICLES)
+
+
+@pytest.mark.parametrize("cause", ["cubic_stiffness", "sensitivity_error", "gain_drift"])
+def test_an_effect_too_weak_for_a_bag_is_found_in_its_lot(fleet, cause):
+    rng = np.random.default_rng(7)
+    # a bag names nothing below 30 variances; this is a quarter of that size
+    size = np.sqrt(30) / 4 / np.median([one.own_part(cause) for one in fleet[:WEAK]])
+    drawn = [one.drawn(rng, cause, size) if i < WEAK else one.drawn(rng)
+             for i, one in enumerate(fleet)]
+    estimates = Estimates.of(drawn)
+    place = next(i for i, (name, _) in enumerate(estimates.names) if name == cause)
+    alone = np.abs(estimates.values[:WEAK, place] / estimates.stds[:WEAK, place])
+    assert np.max(alone) < np.sqrt(30)
+    found, rest = weak_effects(estimates, lots(7))
+    first = found[0]
+    assert first.group == "lot = B"
+    assert cause == first.cause or cause in first.confusable_with
+    assert len(found) == 1, found
+    assert odd_vehicles(rest, list(range(VEHICLES))) == []
+
+
+def test_a_fleet_without_effects_shows_none(fleet):
+    rng = np.random.default_rng(8)
+    for seed in range(5):
+        estimates = Estimates.of([one.drawn(rng) for one in fleet])
+        found, rest = weak_effects(estimates, lots(seed))
+        assert found == [] and odd_vehicles(rest, list(range(VEHICLES))) == []
+
+
+def test_a_vehicle_that_differs_from_its_peers_is_named(fleet):
+    rng = np.random.default_rng(9)
+    drawn = [one.drawn(rng, *(("gain_drift", 12 / one.own_part("gain_drift")) if i == 5 else ()))
+             for i, one in enumerate(fleet)]
+    _, rest = weak_effects(Estimates.of(drawn), {ALL: np.ones(VEHICLES, bool)})
+    odd = odd_vehicles(rest, [f"car {i}" for i in range(VEHICLES)])
+    assert [entry["vehicle"] for entry in odd] == ["car 5"]
+    assert abs(odd[0]["deviations"]) > 6
+
+
+def test_bags_of_a_vehicle_are_one_estimate():
+    rng = np.random.default_rng(10)
+    screened = [{"estimates": [{"cause": "a", "parameter": "b", "unit": "1", "value": value,
+                                "std": 0.5, "size": 1.0}], "correlations": []}
+                for value in rng.normal(2.0, 0.5, 8)]
+    estimates = Estimates.of(screened)
+    owners, own = estimates.by_owner(["one"] * 4 + ["two"] * 4)
+    assert owners == ["one", "two"]
+    assert own.values[:, 0] == pytest.approx([np.mean(estimates.values[:4, 0]),
+                                              np.mean(estimates.values[4:, 0])])
+    assert np.all(own.stds >= 0.25)
+
+
+def test_a_cause_that_one_lot_names_more_often_is_told():
+    lot = np.arange(60) < 20
+    named = [{"a"} if lot[i] and i % 2 else {"b"} if i % 7 == 0 else set() for i in range(60)]
+    found = common_causes(named, {ALL: np.ones(60, bool), "lot = B": lot, "lot = A": ~lot})
+    assert [(entry["group"], entry["cause"]) for entry in found] == [("lot = B", "a")]
+    assert (found[0]["vehicles"], found[0]["of"], found[0]["elsewhere"]) == (10, 20, 0)
+
+
+def test_groups_of_columns():
+    groups = groups_of({"lot": ["A"] * 12 + ["B"] * 8 + ["C"] * 4,
+                        "mileage": [str(i) for i in range(24)], "note": [""] * 24}, 24)
+    assert {"lot = A", "lot = B", ALL} <= groups.keys() and "lot = C" not in groups
+    assert sum("mileage" in name for name in groups) == 0  # six in each part are too few
+    groups = groups_of({"mileage": [str(i) for i in range(40)]}, 40)
+    parts = [rows for name, rows in groups.items() if "mileage" in name]
+    assert len(parts) == 4 and np.sum(parts, axis=0).tolist() == [1] * 40

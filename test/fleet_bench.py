@@ -1,0 +1,122 @@
+"""Figures of a fleet: ``make bench-fleet``, or ``python -m fleet_bench PART`` beside test/.
+
+``pooling``: how often an effect at a quarter of what a bag can show is found in its lot, and what
+is found that is not there. ``workers``: bags with workers killed at random, time and memory.
+"""
+
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import fleet_rig
+import numpy as np
+
+from frac_accel.fleet.groups import groups_of
+from frac_accel.fleet.pooled import Estimates, odd_vehicles, weak_effects
+from frac_accel.fleet.store import Store
+from frac_accel.model import SensorModel
+
+
+def pooling(vehicles, weak, draws):
+    """A lot of weak ones among as many vehicles, a cause after the other."""
+    rng, model = np.random.default_rng(23), SensorModel.from_dict(fleet_rig.model())
+    causes = list(fleet_rig.CAUSES)
+    fleet = [fleet_rig.ScreenedVehicle(
+        fleet_rig.vehicle(rng, causes if i < weak else (), 3.0), model) for i in range(vehicles)]
+    found, named, wrong, odd, discoveries = 0, 0, 0, 0, 0
+    for draw in range(draws):
+        cause = causes[draw % len(causes)]
+        size = np.sqrt(30) / 4 / np.median([one.own_part(cause) for one in fleet[:weak]])
+        groups = groups_of({
+            "lot": ["B" if i < weak else f"A{i % 5}" for i in range(vehicles)],
+            "firmware": [f"{v}" for v in rng.integers(1, 6, vehicles)],
+            "mileage": [f"{v:.0f}" for v in rng.uniform(1e3, 1e5, vehicles)]}, vehicles)
+        estimates = Estimates.of([one.drawn(rng, cause, size) if i < weak else one.drawn(rng)
+                                  for i, one in enumerate(fleet)])
+        effects, rest = weak_effects(estimates, groups)
+        right = [e for e in effects if e.group == "lot = B"
+                 and (e.cause == cause or cause in e.confusable_with)]
+        found += bool(right)
+        named += bool(right) and right[0].cause == cause
+        wrong += len(effects) - len(right)
+        discoveries += len(effects)
+        odd += len(odd_vehicles(rest, list(range(vehicles))))
+        print(f"{cause}: {[(e.group, e.cause, e.confusable_with) for e in effects]}", flush=True)
+    print(f"{draws} draws, {weak} of {vehicles} vehicles: in {found} found in its lot, in {named} "
+          f"as the first cause; {wrong} of {discoveries} discoveries false; {odd} vehicles odd")
+
+
+def workers(count):
+    """Bags corrected on one and two workers, and once more with workers killed at random."""
+    with tempfile.TemporaryDirectory() as folder:
+        folder, rng = Path(folder), np.random.default_rng(2)
+        (folder / "model.yaml").write_text(json.dumps(fleet_rig.model()))
+        (folder / "bags").mkdir()
+        own = fleet_rig.vehicle(rng, duration_s=2.0)
+        for i in range(count):
+            fleet_rig.write_bag(folder / "bags" / f"{i:05}.mcap", own, rng, 60.0 * i)
+        for number, kills in ((1, 0), (2, 0), (2, max(count // 50, 2))):
+            results = folder / f"results-{number}-{kills}"
+            began = time.monotonic()
+            killed, status = _run(folder, results, number, kills)
+            took = time.monotonic() - began
+            rows = Store(str(results), "correct").read().to_pylist()
+            hashes = {row["sha256"] for row in rows}
+            own_s = sum(row["wall_s"] for row in rows)
+            print(f"{number} workers, {killed} killed: {took:.1f} s for {own_s:.1f} s of work, "
+                  f"status {status}; {count - len(hashes)} lost, {len(rows) - len(hashes)} double; "
+                  f"at most {max(row['memory_mb'] for row in rows):.0f} MB a worker", flush=True)
+
+
+def _run(folder, results, number, kills):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "frac_accel.cli", "fleet", "correct", folder / "bags", "-o", results,
+         "--model", folder / "model.yaml", "--workers", str(number)],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    killed = 0
+    while process.poll() is None:
+        time.sleep(random.uniform(0.5, 2.0))
+        own = [int(status.parent.name) for status in Path("/proc").glob("[0-9]*/stat")
+               if _parent(status) == process.pid]
+        if killed < kills and own and (results / "correct-files").exists():
+            try:
+                os.kill(random.choice(own), signal.SIGKILL)
+                killed += 1
+            except OSError:
+                pass
+    return killed, process.returncode
+
+
+def _parent(status):
+    try:
+        if "spawn_main" not in (status.parent / "cmdline").read_text():
+            return None
+        return int(status.read_text().rsplit(")", 1)[1].split()[1])
+    except (OSError, ValueError):
+        return None
+
+
+def main():
+    """Entry point."""
+    parser = argparse.ArgumentParser(prog="fleet_bench", description=__doc__)
+    parser.add_argument("part", choices=["pooling", "workers"])
+    parser.add_argument("--vehicles", type=int, default=300)
+    parser.add_argument("--weak", type=int, default=30)
+    parser.add_argument("--draws", type=int, default=100)
+    parser.add_argument("--bags", type=int, default=10_000)
+    chosen = parser.parse_args()
+    if chosen.part == "pooling":
+        pooling(chosen.vehicles, chosen.weak, chosen.draws)
+    else:
+        workers(chosen.bags)
+
+
+if __name__ == "__main__":
+    main()
