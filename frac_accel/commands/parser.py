@@ -41,7 +41,11 @@ class Parser(argparse.ArgumentParser):
                 yield name
 
     def _options(self):
-        return [option for action in self._actions for option in action.option_strings]
+        """Its own options, and those of verbs within it."""
+        within = [other for action in self._actions if isinstance(action.choices, dict)
+                  for other in action.choices.values()]
+        return [option for action in self._actions for option in action.option_strings] + [
+            option for other in within for option in other._options()]
 
 
 def nearest(name, names):
