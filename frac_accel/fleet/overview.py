@@ -81,7 +81,7 @@ def weak_words(effect):
 def odd_words(entry):
     """An odd vehicle in a line."""
     name = f"{entry['cause']} {entry['parameter']}".strip()
-    return (f"{entry['vehicle']}: {name} {entry['value']:.4g} +- {entry['std']:.2g} "
+    return (f"{entry['vehicle']}: {name} {entry['value']:.4g} ± {entry['std']:.2g} "
             f"{_unit(entry['unit'])}where its peers have {entry['peers']:.3g}: "
             f"{entry['deviations']:.1f} standard deviations")
 

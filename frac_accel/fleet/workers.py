@@ -72,16 +72,16 @@ class LocalCores:
                 done, _ = concurrent.futures.wait(
                     running, return_when=concurrent.futures.FIRST_COMPLETED)
                 for future in done:
-                    result = future.result()
+                    result = _result(future)
                     yield running.pop(future), result
         except BrokenProcessPool:
             alone.extend(running.values())
             for future in list(running):
                 # some had their result before
-                if future.done() and not future.exception():
+                if future.done() and not isinstance(future.exception(), BrokenProcessPool):
                     task = running.pop(future)
                     alone.remove(task)
-                    yield task, future.result()
+                    yield task, _result(future)
         except BaseException:
             # nobody waits for what is still running
             for process in set(multiprocessing.active_children()) - others:
@@ -97,7 +97,7 @@ class LocalCores:
             with self._pool(1) as pool:
                 try:
                     while tasks:
-                        result = pool.submit(function, tasks[0]).result()
+                        result = _result(pool.submit(function, tasks[0]))
                         yield tasks.popleft(), result
                         deaths = 0
                 except BrokenProcessPool:
@@ -109,6 +109,14 @@ class LocalCores:
         return concurrent.futures.ProcessPoolExecutor(
             count, multiprocessing.get_context("spawn"), _begin,
             (self._memory_mb, os.getpid()))
+
+
+def _result(future):
+    """What a process has found; None where it had too little memory to begin or to tell."""
+    try:
+        return future.result()
+    except MemoryError:
+        return None
 
 
 def _begin(memory_mb, parent):

@@ -188,7 +188,7 @@ class Diagnoser(FracAccelNode):
             values += _values(**{f"{entry['cause']}/gain": f"{entry['gain']['reduction']:.3g}"})
             for name, own in entry["parameters"].items():
                 value, std = own["value"], own["std"]
-                words = f"{value:.6g} +- {2 * std:.2g} {own['unit']}" \
+                words = f"{value:.6g} ± {2 * std:.2g} {own['unit']}" \
                     if isinstance(value, float) and std else str(value)
                 values += _values(**{f"{entry['cause']}/{name}": words})
         if result["onset"]:

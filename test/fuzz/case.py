@@ -16,6 +16,9 @@ SHARES = {"correct": 0.3, "simulate": 0.2, "validate": 0.2, "identify": 0.15, "d
 BY_NUMBER = {"report": 10}
 WITHOUT = {"paper": "its study takes minutes; it reads bags as identify and diagnose do",
            "bench": "it reads no file",
+           "convert": "it reads as the others do, and test_formats damages the other formats",
+           "layout": "it reads no file", "watch": "it reads topics",
+           "completion": "it reads no file",
            "fleet": "its workers run the other commands; a bag that fails is a row, not an end"}
 DAMAGES = {"bag octets": 0.2, "bag records": 0.25, "bag samples": 0.2, "metadata": 0.08,
            "model tree": 0.17, "model text": 0.07, "nothing": 0.03}

@@ -185,7 +185,7 @@ def test_seconds_between_clocks_are_found_said_and_taken_out(offset_s, seed):
     assert len(record) > n - 3
     direction = "ahead of" if offset_s > 0 else "behind"
     assert direction in record.words[0] and "taken out" in record.words[0]
-    said = float(re.search(r"clock is (\S+) \+-", record.words[0])[1])
+    said = float(re.search(r"clock is (\S+) ±", record.words[0])[1])
     assert said == pytest.approx(abs(offset_s), abs=2e-3)
 
 
