@@ -11,11 +11,7 @@ from scipy.ndimage import binary_erosion
 from ..budget.reference_noise import reference_noise
 from ..errors import FracAccelError, IdentificationError
 from ..identification.checks.record_checks import moving_samples
-from ..identification.response.excitation import (
-    learning_length,
-    require_excitation,
-    strongest_stretch,
-)
+from ..identification.response.excitation import learning_length, require_excitation
 from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC
 from ..model import AXES, SensorModel
 from ..model.core import Gain, Oscillator
@@ -32,7 +28,7 @@ from .leftover import related
 from .screened import screened
 from .spikes import spikes
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
-from .stretches import MOST
+from .stretches import MOST, strongest_part
 from .time_limit import TimeLimit
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
@@ -145,12 +141,12 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
             **{cause: effect for cause, effect in shown.items() if effect.of_reference}},
         candidates=[cause for cause, effect in known_effects().items()
                     if not effect.read_off and effect.acts_on(model.axis(axis).core)],
-        stages=stages, step=found.step, limit=limit)
+        stages=stages, step=found.step, limit=limit,
+        passed_on=None if noise and noise.bends else noise)
     engine, stray = _without_spikes(engine, used, stray, record.reference[:, column])
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
-    engine.reference_noise = noise
     engine.aside = stray | (record.valid & ~moving)
     _require_relation(engine, axis, seed)
     best = engine.run(seed)
@@ -205,10 +201,8 @@ def _classical(record, axis, used, limit):
     """Classical core (a gain where no resonance shows) identified from the record, what it knows
     of it (nothing, since any cause has bent it), and the effects that it was identified with."""
     from ..identification import identify
-    if len(record) > MOST:
-        # all that is found here is fitted anew
-        rows = strongest_stretch(record.reference[:, AXES.index(axis)], MOST)
-        record, used = record.part(rows), used[rows]
+    # all that is found here is fitted anew
+    record, used = strongest_part(record, AXES.index(axis), used, MOST)
     model = identify(dataclasses.replace(record, valid=used), axis, "classical").model
     stds = dict.fromkeys(_CORE, np.inf)
     core, seed = SensorModel(model.core), {effect.cause: effect for effect in model.effects}

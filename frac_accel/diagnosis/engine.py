@@ -81,7 +81,7 @@ class Engine:
     """
 
     def __init__(self, record, axis, baseline, used, base=None, candidates=(), stages=None,
-                 step=None, limit=None):
+                 step=None, limit=None, passed_on=None):
         slices = stretches_of(record, axis)
         self.problem = Stretches(record, axis, baseline, used, limit, slices) if slices[1:] else \
             Problem(record, axis, baseline, used, limit)
@@ -91,8 +91,8 @@ class Engine:
         # the record, and its samples that may count: of a very long one, more than are fitted
         self.record, self.wanted = record, used
         self.search = Search(self.problem, base, candidates, stages)
-        # of the reference, where it shows too little to bend a fit: `ReferenceNoise` or None
-        self.reference_noise = None
+        # `ReferenceNoise` that is too little to bend a fit, and counts behind no filter; or None
+        self.passed_on = passed_on
         # what counts in no fit, since a signal was at fault there
         self.aside = np.zeros(len(record), bool)
         self.held_out_rows = self.problem.used & held_out(self.problem.record.reference[:, axis])
@@ -289,15 +289,15 @@ class Engine:
         model = p.axis_model(fitted.effects)
         sensor = AxisModel(model.core, tuple(e for e in model.effects if not e.of_reference))
         density = sum(e.unknown_density(frequency) for e in model.effects if e.of_reference)
-        if self.reference_noise and not self.reference_noise.bends:
-            density = density + self.reference_noise.density(frequency)
+        if self.passed_on:
+            density = density + self.passed_on.density(frequency)
         gain = np.abs(sensor.transfer_function(2j * np.pi * frequency))
         return float(np.sqrt(np.mean(gain**2 * density) * p.rate / 2))
 
     def _passed_on(self, fitted):
         """Share of a residual's power by noise of the reference that the model passes on, so that
         what is left follows it; none where the reference counts behind a filter of that noise."""
-        if not self.reference_noise or self.reference_noise.bends:
+        if not self.passed_on:
             return 0.0
         return (self.by_reference(fitted) / max(self.rms(fitted.residual), 1e-300))**2
 

@@ -1,10 +1,10 @@
 """Whether a record without a model is better begun with a gain than with an oscillator."""
 
-from ..identification.response.excitation import strongest_stretch
 from ..model import SensorModel
 from ..model.core import Gain
 from ..model.effects import Effect, known_effects
 from .engine import LONG, Engine
+from .stretches import strongest_part
 
 # Links that are fitted, and the share of an oscillator's residual power that one may leave.
 _FITTED = 6
@@ -39,8 +39,7 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
         With the gain, and what to begin with instead.
     """
     if len(record) > LONG:
-        rows = strongest_stretch(record.reference[:, column], LONG // 2)
-        record, used = record.part(rows), used[rows]
+        record, used = strongest_part(record, column, used, LONG // 2)
     own = Engine(record, column, model, used, opened(model), limit=limit)
     before = own.search.fit({**own.search.base, **seed})
     flat = SensorModel(Gain(model.axes[column].core.sensitivity))

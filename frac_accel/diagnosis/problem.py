@@ -13,7 +13,8 @@ from ..model import AXES, AxisModel, is_link
 from ..model.core.oscillator import tail_rates
 from ..model.effects.base import CORE, CROSS_AXIS, GAIN, Effect
 from ..model.parameters import Scales, fixed_values, parameter_fields
-from ..simulation import AxisSimulator, kept
+from ..signals.kept import kept
+from ..simulation import AxisSimulator
 from .time_limit import TimeLimit
 
 # Samples at both ends that the band-limited simulation cannot know.

@@ -31,6 +31,13 @@ def stretches_of(record, axis):
     return sorted([strongest, *apart], key=lambda rows: rows.start)
 
 
+def strongest_part(record, axis, used, length):
+    """Where the motion is strongest, at most `length` samples of a record; and those `used` there.
+    """
+    rows = strongest_stretch(record.reference[:, axis], length)
+    return record.part(rows), used[rows]
+
+
 class Stretches(Problem):
     """A `Problem` of which some stretches are simulated, each as a record of its own.
 

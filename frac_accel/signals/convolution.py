@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
+from .kept import kept
+
 # Fall of the damped kernel over one period of the transform: what wraps around is below 1e-8
 # of the response, and undoing the damping over half the period costs four of sixteen digits. A
 # shorter period lets what rings ahead of full-band input come back, thirty times larger at 1.5.
@@ -12,7 +14,7 @@ _PERIOD = 2
 # Share of the frequencies, the highest, over which a response is turned to be real at the last.
 _TURNED = 0.2
 # Undamping factors that are kept.
-_UNDAMPINGS = 3
+_UNDAMPINGS = 4
 _LAGRANGE_POINTS = 8
 
 
@@ -84,13 +86,9 @@ class Convolution:
         spectrum[..., -len(self._ramp):] *= np.cos(turn) - 1j * np.sin(turn)
 
     def _undamped(self, factor, count):
-        key = factor, count
-        if key not in self._undamping:
-            # a clock that runs differently needs another count each time
-            while len(self._undamping) > _UNDAMPINGS:
-                del self._undamping[next(iter(self._undamping))]
-            self._undamping[key] = factor * np.exp(self._sigma / factor * np.arange(count))
-        return self._undamping[key]
+        # a clock that runs differently needs another count each time
+        return kept(self._undamping, (factor, count), lambda: factor * np.exp(
+            self._sigma / factor * np.arange(count)), most=_UNDAMPINGS)
 
 
 def at_positions(values, position):

@@ -12,6 +12,7 @@ from ..model.core import Arx
 from ..model.effects.base import CORE, GAIN, Circumstances
 from ..record.sources import is_bag
 from ..signals.convolution import Convolution, at_positions
+from ..signals.kept import kept
 from .modes import modes_of
 
 # Factor by which the response of a linear sensor is refined before it is read between samples.
@@ -326,17 +327,6 @@ class AxisSimulator:
             self._room_s = max(abs(delay_s), 64 / self._rate)
             self._convolution = Convolution(self._moving, self._rate, self._room_s)
         return self._convolution
-
-
-def kept(store, key, make, *arguments, most=8):
-    """What `make` returns, from the dict `store` if it is there; the last few used stay there."""
-    if key in store:
-        store[key] = store.pop(key)
-    else:
-        while len(store) >= most:
-            del store[next(iter(store))]
-        store[key] = make(*arguments)
-    return store[key]
 
 
 def _shift(s, delay_s):
