@@ -28,8 +28,9 @@ _RESEMBLES = 30.0
 # in RMS, that the law must then take to be told from others.
 _ALIKE, _TELLS_LAW = 0.8, 5.0
 # Parts of the record over whose length the mean shows what is slow, and share of what a cause
-# adds (RMS) from which it is slow.
-_SLOW_PARTS, _SLOW_SHARE = 20, 0.5
+# adds (RMS) from which it is slow. Then it must take so many times what is left wanders by: the
+# best step in noise with a long memory takes three to four times that.
+_SLOW_PARTS, _SLOW_SHARE, _SLOW_TIMES = 20, 0.5, 6.0
 # Share of what a cause takes (RMS) that it must change the output by: else its free motion does
 # that.
 _BY_ITSELF = 0.5
@@ -98,7 +99,7 @@ def _as_slow(engine, best, added, takes):
         return engine.rms(uniform_filter1d(values, max(p.count // _SLOW_PARTS, 1)))
     wanders = slow(best.residual)
     for cause, change in added.items():
-        if takes[cause] < WEIGHS * wanders and slow(change) > _SLOW_SHARE * engine.rms(change):
+        if takes[cause] < _SLOW_TIMES * wanders and slow(change) > _SLOW_SHARE * engine.rms(change):
             found[cause] = f"what it explains is slow ({takes[cause]:.3g} RMS), and what is left " \
                            f"wanders by {wanders:.3g} RMS"
     return found
