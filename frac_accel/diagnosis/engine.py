@@ -52,9 +52,10 @@ _UNMOVED = 3.0
 # noise.
 _PART = 0.1
 _PART_AT_LEAST = 0.03
-# Share of bursts above which these are no heavy tails of noise (0.13 of Student's t with three
-# degrees of freedom).
-_TAILS = 0.3
+# Shares that noise has, too: of bursts by heavy tails (0.13 of Student's t with three degrees of
+# freedom), and of slow ones where its density grows with one over the frequency (0.11 to 0.49).
+_HEAVY_TAILS, _LONG_MEMORY = 0.3, 0.5
+_OF_NOISE = {"bursts": _HEAVY_TAILS, "slow": _LONG_MEMORY}
 # Share of the residual's power for which a coarse lattice must account.
 _COARSE = 0.2
 # Frequencies over which a density is integrated.
@@ -386,7 +387,7 @@ class Engine:
                   for entry in parts if entry["part"] != "noise"]
         return sorted(
             ((share, part) for share, low, part in shares
-             if share > (_TAILS if part == "bursts" else _PART) and low > _PART_AT_LEAST),
+             if share > _OF_NOISE.get(part, _PART) and low > _PART_AT_LEAST),
             reverse=True)
 
     def unexplained(self, fitted):
