@@ -5,6 +5,7 @@ import contextlib
 import hashlib
 import json
 import math
+import os
 import re
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ from tqdm import tqdm
 
 from ..errors import BagError, FracAccelError
 from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC, BagReader
-from ..io.outputs import guard, write_text
+from ..io.outputs import guard, sweep, write_text
 from ..io.regular_file import open_regular
 from ..model.parameters import plain
 from ..record import Temperature
@@ -139,7 +140,11 @@ def open_bag(path):
 
 def guard_files(arguments):
     """Refuse options whose output is one of the inputs or another output."""
-    guard(_files(arguments, OUTPUTS), _files(arguments, INPUTS))
+    inputs, outputs = _files(arguments, INPUTS), _files(arguments, OUTPUTS)
+    for folder in {os.path.dirname(os.path.abspath(file)) for file in [*inputs, *outputs]}:
+        # what a killed run was about to name
+        sweep(folder)
+    guard(outputs, inputs)
 
 
 def _files(arguments, options):
