@@ -235,7 +235,8 @@ def test_a_kill_between_the_renames_is_finished_by_the_next_run(tmp_path, existi
     new = {name: f"new {name}".encode() for name in names}
     before, step, seen = begin(), 1, []
     while killed_at(step, write_all):
-        half = {name: (tmp_path / name).read_bytes() for name in names if (tmp_path / name).exists()}
+        half = {name: (tmp_path / name).read_bytes() for name in names
+                if (tmp_path / name).exists()}
         outputs.sweep(tmp_path / found_by)
         now = {name: data for name, data in content(tmp_path).items() if name in names}
         assert now in (before, new)
