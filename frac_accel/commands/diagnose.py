@@ -2,11 +2,8 @@
 
 import sys
 
-from ..diagnosis import diagnose
-from ..io.bag import TEMPERATURE_TOPIC, read_temperature
 from ..io.outputs import say
-from ..model import SensorModel
-from ..report.quantity import written
+from ..io.topics import TEMPERATURE_TOPIC
 from ._common import (
     add_bag,
     add_json,
@@ -54,6 +51,9 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
+    from ..diagnosis import diagnose
+    from ..io.bag import read_temperature
+    from ..model import SensorModel
     require_report(arguments.report)
     model = SensorModel.load(arguments.model) if arguments.model else None
     reader = open_bag(arguments.bag)
@@ -88,6 +88,7 @@ def run(arguments):
 
 def table(found, axis):
     """The diagnosis as text."""
+    from ..report.quantity import written
     lines = [f"axis {axis}: {found.verdict}: {found.reason}"]
     lines += [f"data: {words}" for words in found.integrity.words]
     if found.verdict == "insufficient_data":
