@@ -2,6 +2,7 @@
 
 import sys
 
+from ..errors import naming
 from ..io.outputs import say
 from ..io.topics import TEMPERATURE_TOPIC
 from ._common import (
@@ -64,7 +65,7 @@ def run(arguments):
     elif arguments.temperature != TEMPERATURE_TOPIC:
         print(f"warning: {arguments.bag}: no topic {arguments.temperature}: what depends on "
               "temperature cannot be found", file=sys.stderr)
-    with share_done() as show:
+    with share_done() as show, naming(arguments.bag):
         found = diagnose(arguments.bag, model, arguments.axis, temperature, arguments.reference,
                          arguments.sensor, show,
                          arguments.noise_std, arguments.time_limit,
