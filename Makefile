@@ -48,8 +48,10 @@ test: setup lint types
 	$(python) $(numerical) -m "not ros and not long"
 	$(python) -m pytest -m ros
 
-# The further draws and the long Monte Carlos (hours), and the rest with the oldest libraries.
+# The further draws and the long Monte Carlos (hours), the site, and the rest with the oldest
+# libraries.
 test-all: setup
+	@$(MAKE) --no-print-directory docs
 	$(python) $(numerical) -m "not ros and long"
 	@$(MAKE) --no-print-directory test-others
 

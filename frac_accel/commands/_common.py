@@ -1,25 +1,27 @@
-"""What the verbs share: options, results as files, progress."""
+"""What the verbs share: options, results as files, progress.
+
+What a verb works with is imported where it works: help and completion need none of it.
+"""
 
 import argparse
 import contextlib
 import hashlib
 import json
 import math
+import os
 import re
 import sys
 from pathlib import Path
 
-import numpy as np
-from tqdm import tqdm
-
 from ..errors import BagError, FracAccelError
-from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC, BagReader
-from ..io.outputs import guard, write_text
+from ..io.outputs import guard, sweep, write_text
 from ..io.regular_file import open_regular
-from ..model.parameters import plain
-from ..record import Temperature
+from ..io.topics import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC
 from ..report import require_plotly
 
+# Those of `identification`, whose import takes half a second.
+STRUCTURES = ("auto", "classical", "arx", "oscillator", "fractional", "gain",
+              "fractional_transfer_function")
 BAG_HELP = ".mcap file or rosbag2 folder, or .db3, .csv, .parquet, .mf4, .npz (see convert)"
 _NUMBERS = re.compile(r"\[([-+.\deEnul,\s]*)\]")
 # Options that name files, of all verbs.
@@ -63,6 +65,9 @@ def read_temperature_at(reader, topic):
     BagError
         If the bag has no such topic, or nothing usable on it.
     """
+    import numpy as np
+
+    from ..record import Temperature
     blocks = list(reader.temperatures(topic))
     stamps, celsius = (np.concatenate([np.empty(0, dtype), *(getattr(block, name)
                                                              for block in blocks)])
@@ -120,6 +125,7 @@ def write_json(path, result):
     """Write a result; numbers that are none (NaN) become null, as JSON knows no other way."""
     if path is None:
         return
+    from ..model.parameters import plain
     text = json.dumps(_without_nan(plain(result)), indent=1, allow_nan=False)
     # a list of numbers is one line, not one for each
     text = _NUMBERS.sub(lambda found: f"[{' '.join(found[1].split())}]", text)
@@ -131,6 +137,7 @@ def write_json(path, result):
 
 def open_bag(path):
     """BagReader whose damage is told at once."""
+    from ..io.bag import BagReader
     reader = BagReader(path)
     for warning in reader.warnings:
         print(f"warning: {warning}", file=sys.stderr)
@@ -139,7 +146,11 @@ def open_bag(path):
 
 def guard_files(arguments):
     """Refuse options whose output is one of the inputs or another output."""
-    guard(_files(arguments, OUTPUTS), _files(arguments, INPUTS))
+    inputs, outputs = _files(arguments, INPUTS), _files(arguments, OUTPUTS)
+    for folder in {os.path.dirname(os.path.abspath(file)) for file in [*inputs, *outputs]}:
+        # what a killed run was about to name
+        sweep(folder)
+    guard(outputs, inputs)
 
 
 def _files(arguments, options):
@@ -156,6 +167,7 @@ def require_report(path):
 
 def progress(total, unit="msg"):
     """Bar on standard error, where that is a terminal, that shows after two seconds."""
+    from tqdm import tqdm
     return tqdm(total=total, unit=unit, delay=2, leave=False, file=sys.stderr, unit_scale=True,
                 disable=None)
 
@@ -163,6 +175,7 @@ def progress(total, unit="msg"):
 @contextlib.contextmanager
 def share_done():
     """The same of work whose share that is done is known: a function of words and that share."""
+    from tqdm import tqdm
     # the pace since the start tells the time left, as the last step alone would not
     with tqdm(total=100, delay=2, leave=False, file=sys.stderr, disable=None, smoothing=0,
               bar_format="{desc}: {percentage:.0f} % done{bar:20} {elapsed}, about {remaining} left"

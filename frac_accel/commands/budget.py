@@ -2,10 +2,7 @@
 
 import sys
 
-from ..budget import WORDS, left_by
 from ..errors import FracAccelError
-from ..io.bag import read_bag
-from ..model import SensorModel
 from ._common import (
     add_bag,
     add_json,
@@ -41,6 +38,9 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
+    from ..budget import left_by
+    from ..io.bag import read_bag
+    from ..model import SensorModel
     model = SensorModel.load(arguments.model) if arguments.model else None
     reader = open_bag(arguments.bag)
     wanted = [arguments.reference, arguments.sensor]
@@ -63,6 +63,7 @@ def run(arguments):
 
 def table(left, axis):
     """The budget as text, the largest part first."""
+    from ..budget import WORDS
     budget = left.budget
     whole = budget.rms / max(budget.output_rms, 1e-300)
     lines = [f"axis {axis}: {left.model}, leaves {budget.rms:.4g} RMS: {whole:.3g} of the "

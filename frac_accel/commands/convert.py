@@ -14,8 +14,6 @@ import dataclasses
 import re
 from pathlib import Path
 
-from ..io.bag import BagReader
-from ..io.formats import Wishes, as_mcap, convert, split_unit
 from ..io.outputs import guard
 from ._common import add_json, positive, write_json
 
@@ -47,6 +45,7 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
+    from ..io.formats import Wishes, convert, split_unit
     files = [_TOPIC.fullmatch(name) or name for name in arguments.inputs]
     files = [(file["topic"], file["rest"]) if isinstance(file, re.Match) else ("", file)
              for file in files]
@@ -67,6 +66,8 @@ def run(arguments):
 
 
 def _open(file, topic, wishes):
+    from ..io.bag import BagReader
+    from ..io.formats import as_mcap
     if topic:
         wishes = dataclasses.replace(wishes, topic=topic)
     if not Path(file).exists():
@@ -75,6 +76,7 @@ def _open(file, topic, wishes):
 
 
 def _mapped(text):
+    from ..io.formats import split_unit
     found = _TOPIC.fullmatch(text)
     names = [split_unit(name.strip())[0] for name in found["rest"].split(",")] if found else []
     if not 1 <= len(names) <= 3 or not all(names):

@@ -2,11 +2,9 @@
 
 import sys
 
-from ..diagnosis import diagnose
-from ..io.bag import TEMPERATURE_TOPIC, read_temperature
+from ..errors import naming
 from ..io.outputs import say
-from ..model import SensorModel
-from ..report.quantity import written
+from ..io.topics import TEMPERATURE_TOPIC
 from ._common import (
     add_bag,
     add_json,
@@ -54,6 +52,9 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
+    from ..diagnosis import diagnose
+    from ..io.bag import read_temperature
+    from ..model import SensorModel
     require_report(arguments.report)
     model = SensorModel.load(arguments.model) if arguments.model else None
     reader = open_bag(arguments.bag)
@@ -64,7 +65,7 @@ def run(arguments):
     elif arguments.temperature != TEMPERATURE_TOPIC:
         print(f"warning: {arguments.bag}: no topic {arguments.temperature}: what depends on "
               "temperature cannot be found", file=sys.stderr)
-    with share_done() as show:
+    with share_done() as show, naming(arguments.bag):
         found = diagnose(arguments.bag, model, arguments.axis, temperature, arguments.reference,
                          arguments.sensor, show,
                          arguments.noise_std, arguments.time_limit,
@@ -88,6 +89,7 @@ def run(arguments):
 
 def table(found, axis):
     """The diagnosis as text."""
+    from ..report.quantity import written
     lines = [f"axis {axis}: {found.verdict}: {found.reason}"]
     lines += [f"data: {words}" for words in found.integrity.words]
     if found.verdict == "insufficient_data":

@@ -10,14 +10,11 @@ import contextvars
 import os
 
 from ..errors import FracAccelError
-from ..fleet.inspection import inspect
 from ..fleet.places import find_bags, output_at
-from ..fleet.plan import Models, Plan, Table, known_bags
 from ..fleet.workers import Cluster, LocalCores, Named
-from ..identification import STRUCTURES
-from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC
 from ..io.outputs import say
-from ._common import add_filter, add_temperature, add_topics, positive, progress
+from ..io.topics import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC
+from ._common import STRUCTURES, add_filter, add_temperature, add_topics, positive, progress
 from ._fleet_row import row
 
 __all__ = ["EXAMPLES", "add_arguments", "row", "run"]
@@ -100,6 +97,7 @@ def run(arguments):
     try:
         import fsspec  # noqa: F401
 
+        from ..fleet.plan import Models, Plan, Table, known_bags
         from ..fleet.store import Store
     except ModuleNotFoundError as error:
         raise FracAccelError(f"the Python library {error.name} is missing; install it with "
@@ -162,6 +160,7 @@ def _options(arguments):
 
 def _inspected(arguments, bags, known, who):
     """What the bags are; those that have not changed since their rows are not read again."""
+    from ..fleet.inspection import inspect
     found, unknown = [], {}
     for bag in bags:
         seen = known.get((bag.url, bag.size, bag.changed))

@@ -7,13 +7,10 @@ mean, and whether they agree is said.
 from pathlib import Path
 
 from ..errors import naming
-from ..identification import STRUCTURES, identify
 from ..io.outputs import say
-from ..record import Record
-from ..report.identification import identification_page
-from ..report.quantity import left_open_by, written
 from ._common import (
     BAG_HELP,
+    STRUCTURES,
     add_json,
     add_report,
     add_topics,
@@ -46,6 +43,8 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
+    from ..identification import identify
+    from ..record import Record
     bags = arguments.bags
     require_report(arguments.report)
     for bag in bags:
@@ -65,6 +64,7 @@ def run(arguments):
     _print(result, pairs, bags)
     say(f"{arguments.output}: written")
     if arguments.report:
+        from ..report.identification import identification_page
         page = identification_page(result, source)
         page.write(arguments.report)
         source = page.provenance
@@ -79,6 +79,7 @@ def _told_apart(bags):
 
 
 def _print(result, pairs, bags):
+    from ..report.quantity import left_open_by, written
     for bag, pair in zip(bags, pairs):
         name = f"{Path(bag).name}: " if len(bags) > 1 else ""
         print(f"{name}{len(pair)} samples at {pair.sampling_rate_hz:.6g} Hz")

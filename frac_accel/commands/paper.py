@@ -3,7 +3,7 @@ again, its claims audited, and its experiment done properly on the bench's bags.
 """
 
 from ..io.outputs import say
-from ..paper import BAGS, PaperResult, reproduce
+from ..io.shared_files import shared_folder
 from ._common import (
     add_json,
     add_report,
@@ -13,6 +13,7 @@ from ._common import (
     write_json,
 )
 
+BAGS = shared_folder("bags")
 EXAMPLES = """
 frac_accel paper --quick
 frac_accel paper --report paper.html
@@ -32,6 +33,7 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
+    from ..paper import reproduce
     require_report(arguments.report)
     with share_done() as show:
         result = reproduce(not arguments.quick, arguments.bags, show)
@@ -43,8 +45,8 @@ def run(arguments):
     write_json(arguments.json, result.as_dict())
 
 
-def table(result: PaperResult):
-    """The result as text."""
+def table(result):
+    """A `PaperResult` as text."""
     lines = []
     for number, content in result.tables.items():
         lines.append(f"Table {number}: {content.title}")

@@ -2,13 +2,9 @@
 
 import json
 
-from ..diagnosis import Diagnosis
 from ..errors import FracAccelError
-from ..identification import Identification
 from ..io.outputs import say
 from ..io.regular_file import read_text
-from ..report.diagnosis import diagnosis_page
-from ..report.identification import identification_page
 from ._common import require_report
 
 _LARGEST = 64 * 2**20
@@ -50,7 +46,11 @@ def _page(path, data):
                                  "frac_accel diagnose or identify --json writes")
         source = data.get("provenance")
         if "verdict" in data:
+            from ..diagnosis import Diagnosis
+            from ..report.diagnosis import diagnosis_page
             return diagnosis_page(Diagnosis.from_dict(data), source)
+        from ..identification import Identification
+        from ..report.identification import identification_page
         return identification_page(Identification.from_dict(data), source)
     except FracAccelError as error:
         raise FracAccelError(f"{path}: {error}") from None

@@ -4,12 +4,6 @@ The output bag holds the reference as it is and the simulated sensor on the sens
 it can be identified, corrected and validated like a measured one.
 """
 
-import numpy as np
-
-from ..io.bag import BagWriter, cdr
-from ..model import SensorModel
-from ..record.record import UniformSamples
-from ..simulation import simulate
 from ._common import (
     add_bag,
     add_json,
@@ -43,6 +37,12 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
+    import numpy as np
+
+    from ..io.bag import BagWriter, cdr
+    from ..model import SensorModel
+    from ..record.record import UniformSamples
+    from ..simulation import simulate
     model = SensorModel.load(arguments.model)
     reader = open_bag(arguments.bag)
     info = reader.topic(arguments.reference, cdr.ACCELERATION_TYPES)

@@ -1,12 +1,7 @@
 """Judge a model on a measured pair: its simulation, and the correction that it gives."""
 
 from ..errors import FracAccelError
-from ..io.bag import read_bag
 from ..io.outputs import say
-from ..model import SensorModel
-from ..report.correction import BeforeAfter, correction_page, filter_words
-from ..report.quantity import percent
-from ..validation import validate
 from ._common import (
     add_bag,
     add_filter,
@@ -44,6 +39,9 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
+    from ..io.bag import read_bag
+    from ..model import SensorModel
+    from ..validation import validate
     require_report(arguments.report)
     model = SensorModel.load(arguments.model)
     reader = open_bag(arguments.bag)
@@ -66,6 +64,8 @@ def run(arguments):
 
 
 def _page(result, model, arguments):
+    from ..report.correction import BeforeAfter, correction_page, filter_words
+    from ..report.quantity import percent
     axis, seen, filters = arguments.axis, result.comparison, result.filters
     drawn = BeforeAfter(axis, filters["sampling_rate_hz"], seen.stamps_ns, seen.before, seen.after,
                         seen.std, filters["axes"][axis]["band_hz"], seen.reference)

@@ -280,13 +280,21 @@ class _SmoothTaps:
 
     def columns(self, z):
         """Response of each unknown at z**-1 = `z`, shape (len(z), unknowns)."""
-        shape = np.polyval(self.kernel(), z)
+        # four sums over `step` taps each, which is what the kernel is
+        half = np.angle(z) / 2
+        with np.errstate(invalid="ignore"):
+            single = np.where(half == 0, 1.0, np.sin(self.step * half) / (
+                self.step * np.sin(half)))
+        shape = single**4 * np.exp(4j * (self.step - 1) * half)
         return shape[:, None] * np.vander(z**self.step, self.unknowns, increasing=True)
 
     def taps(self, unknowns):
-        spread = np.zeros((self.unknowns - 1) * self.step + 1)
-        spread[::self.step] = unknowns
-        return np.convolve(spread, self.kernel())
+        # each unknown's kernel, `step` taps after the one before: four pieces that overlap
+        pieces = np.pad(self.kernel(), (0, 3)).reshape(4, self.step)
+        rows = np.zeros((self.unknowns + 3, self.step))
+        for number, piece in enumerate(pieces):
+            rows[number:number + self.unknowns] += np.outer(unknowns, piece)
+        return rows.ravel()[:self.length]
 
 
 def _band_grid(band, rate, poles_s, delay):

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from frac_accel.errors import BagError
-from frac_accel.io.samples import Samples
+from frac_accel.io.samples import Correlated, Samples
 
 IMU = "sensor_msgs/msg/Imu"
 ACCEL_STAMPED = "geometry_msgs/msg/AccelStamped"
@@ -134,6 +134,16 @@ def read_samples_at(
     return _samples_of(records, frame_id)
 
 
+def read_covariances(messages: Sequence[bytes]) -> np.ndarray:
+    """Whole ``linear_acceleration_covariance`` (n, 9) of serialised Imu messages."""
+    if not messages:
+        return np.empty((0, 9))
+    records, _ = _records(IMU, *_joined(messages))
+    if records is None:
+        return np.concatenate([read_covariances([message]) for message in messages])
+    return records["covariance"].astype(np.float64)
+
+
 def _samples_of(records: np.ndarray, frame_id: str) -> Samples:
     values = records["acceleration"].astype(np.float64)
     if "covariance" in records.dtype.names:
@@ -184,7 +194,8 @@ def encode_samples(type_name: str, samples: Samples) -> list[bytes]:
     """One serialised message per sample, of a type of `SAMPLE_TYPES`.
 
     An Imu says that it has neither orientation nor angular velocity (REP-145: first covariance
-    element -1); an unknown variance is written as 0.
+    element -1); an unknown variance is written as 0. Of `Correlated` samples the whole covariance
+    is written.
     """
     if type_name not in SAMPLE_TYPES:
         raise BagError(f"samples cannot be written one by one as {type_name}")
@@ -195,12 +206,13 @@ def encode_samples(type_name: str, samples: Samples) -> list[bytes]:
         template = bytearray(template)
         struct.pack_into("<5d", template, body, *orientation)
         struct.pack_into("<d", template, body + 128, -1.0)
+    templates = [bytes(template)] * len(samples.stamps_ns)
+    if type_name == IMU and isinstance(samples, Correlated):
+        rows = np.asarray(samples.covariance, "<f8")
+        whole = body + _FIELDS[IMU]["covariance"].offset
+        templates = [bytes(template[:whole]) + row.tobytes() for row in rows]
     return patch_samples(
-        type_name,
-        [bytes(template)] * len(samples.stamps_ns),
-        samples.stamps_ns,
-        samples.values,
-        samples.variance,
+        type_name, templates, samples.stamps_ns, samples.values, samples.variance
     )
 
 

@@ -2,7 +2,8 @@
 
 An output is made in a hidden folder beside its target and renamed when it is complete and on the
 disk; within `together` the renames wait for the end. The folder is locked while its process lives.
-One that nobody holds was left by a process that was killed: whoever next writes there removes it.
+One that nobody holds was left by a process that was killed: whoever next works there finishes what
+was `announced <announcement>`, and removes it.
 """
 
 import contextlib
@@ -17,8 +18,8 @@ import tempfile
 from pathlib import Path
 
 from ..errors import FracAccelError
+from .announcement import PREFIX, SUFFIX, announce, finish, sync, withdraw
 
-_PREFIX, _SUFFIX = ".frac_accel-", ".partial"
 _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _current = contextvars.ContextVar("outputs made together", default=None)
 
@@ -106,7 +107,7 @@ class Output:
     def settle(self):
         """Have the disk confirm the new name."""
         if self._is_placed:
-            _sync_one(self._parent)
+            sync(self._parent)
 
 
 class _Together:
@@ -234,17 +235,18 @@ def guard(outputs, inputs):
 
 
 def sweep(folder):
-    """Remove what killed processes left in a folder; what a living one holds stays."""
+    """Finish or remove what killed processes left in a folder; what a living one holds stays."""
     with contextlib.suppress(OSError):
         with os.scandir(folder) as entries:
             names = [entry.name for entry in entries
-                     if entry.name.startswith(_PREFIX) and entry.name.endswith(_SUFFIX)]
+                     if entry.name.startswith(PREFIX) and entry.name.endswith(SUFFIX)]
         for name in names:
             with contextlib.suppress(OSError):
                 lock = os.open(os.path.join(folder, name), os.O_RDONLY | os.O_DIRECTORY
                                | os.O_NOFOLLOW)
                 try:
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    finish(Path(folder, name))
                     shutil.rmtree(os.path.join(folder, name), ignore_errors=True)
                 finally:
                     os.close(lock)
@@ -253,7 +255,11 @@ def sweep(folder):
 def _put(outputs):
     """Rename all or none."""
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
+    files = [output for output in outputs if not output.to_device]
+    paths = [output.path for output in files]
     try:
+        if len(files) > 1:
+            announce(paths, [output.target for output in files])
         for output in outputs:
             output.put(len(outputs) == 1)
         for output in outputs:
@@ -261,6 +267,8 @@ def _put(outputs):
     except BaseException:
         for output in reversed(outputs):
             output.take_back()
+        if len(files) > 1:
+            withdraw(paths)
         raise
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
@@ -268,7 +276,7 @@ def _put(outputs):
 
 def _locked_folder(parent):
     while True:
-        path = tempfile.mkdtemp(prefix=_PREFIX, suffix=_SUFFIX, dir=parent)
+        path = tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=parent)
         try:
             lock = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
         except FileNotFoundError:
@@ -292,19 +300,7 @@ def _sync(path):
     if path.is_dir():
         for file in path.iterdir():
             _sync(file)
-    _sync_one(path)
-
-
-def _sync_one(path):
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    except OSError as error:
-        # some file systems know no such thing for folders
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
-            raise
-    finally:
-        os.close(descriptor)
+    sync(path)
 
 
 def _is_device(path):

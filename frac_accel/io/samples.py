@@ -66,3 +66,24 @@ class Samples(NamedTuple):
             np.concatenate([block.variance for block in blocks]),
             blocks[0].frame_id,
         )
+
+
+class Correlated(Samples):
+    """Samples of an Imu whose covariance is more than its diagonal.
+
+    Attributes
+    ----------
+    covariance : float64 (n, 9)
+        ``linear_acceleration_covariance`` row by row.
+    """
+
+    covariance: np.ndarray
+
+    @classmethod
+    def from_samples(cls, samples: Samples, covariance: np.ndarray) -> Samples:
+        """`samples` themselves where there is nothing beside the diagonal."""
+        if not np.delete(covariance, [0, 4, 8], axis=1).any():
+            return samples
+        result = cls(*samples)
+        result.covariance = covariance
+        return result

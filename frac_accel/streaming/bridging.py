@@ -10,11 +10,17 @@ covariance follows from the structure function :math:`D(\tau) = E (x_{t+\tau} - 
 
 with :math:`e_k = x_k - (1-s_k) x_a - s_k x_b`. Errors within a gap belong together, and so do the
 filter's responses to them: an ensemble of `MEMBERS` errors with exactly this covariance runs
-through the filter beside the samples, and the mean of the squares is the variance. Different gaps
-are independent, up to the finite ensemble.
+through the filter beside the samples, and the mean of the squares is the variance.
+
+Neighbours belong together, too. A line is wrong by what the second differences of the samples that
+it replaces add up to, :math:`e = -G \Delta^2 x`, whatever the gap, so that the autocovariance of
+the second difference, known from the triples that are there, says how the errors of a gap go with
+those of the gaps before it. Each member follows its own errors there by linear regression; what is
+left of the gap's covariance is drawn beside it, orthogonal to the last `MEMBERS` draws.
 """
 
 import collections
+import functools
 
 import numpy as np
 
@@ -33,6 +39,9 @@ _POINTS = 48
 # Of its size, what the response to a gap may still have when it is no longer followed, and the
 # longest time [samples] that it is.
 _FADED, _LONGEST = 1e-5, 20_000
+# Gaps of at most `_SHORT` samples are drawn with the last `_GAPS` before them, no more than `_NEAR`
+# samples earlier; share of noise in what is known of these.
+_SHORT, _GAPS, _NEAR, _RIDGE = 12, 6, 40, 0.02
 # Samples of an ensemble that are filtered at once.
 _PIECE = 1024
 
@@ -60,7 +69,8 @@ class BridgeErrors:
         self.longest = longest
         self._blocks, self._length = collections.deque(), 0
         self._total, self._found_at = 0, None
-        self._roots = {}
+        self._roots, self._next = {}, 0
+        self._near = collections.deque()
         self._random = np.random.default_rng(0)
 
     def add(self, values):
@@ -90,20 +100,88 @@ class BridgeErrors:
         if self._found_at is None or self._total - self._found_at >= due:
             self._values = np.concatenate([*self._blocks, np.empty((0, 3))])[-HISTORY:]
             self._structure = _structure(self._values, self.longest + 2)
+            self._curvature = _curvature(self._values)
             self._found_at = self._total
             self._roots = {}
         key = missing, noise.tobytes()
         if key not in self._roots:
             self._roots[key] = _roots(self._values, self._structure, missing, noise)
-        flips = 1 - 2 * self._random.integers(0, 2, (3, MEMBERS))
-        rows = self._random.permutation(MEMBERS)
         # where the motion grows, the change over the gap says so
-        grown = np.square(change) / np.maximum(4 * self._structure[missing + 1], 1e-300)
-        result = np.empty((missing, 3, MEMBERS))
-        for axis, root in enumerate(self._roots[key]):
-            result[:, axis] = root @ (_SIGNS[rows[:root.shape[1]]] * flips[axis])
-            result[:, axis] *= np.sqrt(max(grown[axis], 1.0))
-        return result
+        grown = np.maximum(
+            np.square(change) / np.maximum(4 * self._structure[missing + 1], 1e-300), 1.0)
+        roots = [root * np.sqrt(more) for root, more in zip(self._roots[key], grown)]
+        result = self._following(missing)
+        if result is None:
+            result = np.zeros((3, missing, MEMBERS))
+        else:
+            roots = _rest(roots, result)
+        flips = 1 - 2 * self._random.integers(0, 2, (3, MEMBERS, 1))
+        rows = (self._next + np.arange(MEMBERS)) % MEMBERS
+        for axis, root in enumerate(roots):
+            count = root.shape[1]
+            result[axis] += root @ (_SIGNS[rows[:count]] * flips[axis, :count])
+        self._next += min(missing, MEMBERS)
+        self._near.append((self._total, result))
+        return result.transpose(1, 0, 2)
+
+    def _following(self, missing):
+        """What the gaps just before tell of a gap, (3, missing, MEMBERS); None: nothing."""
+        while self._near and (self._total - self._near[0][0] > _NEAR or len(self._near) > _GAPS):
+            self._near.popleft()
+        lengths = [near.shape[1] for _, near in self._near]
+        if not lengths or max(*lengths, missing) > _SHORT:
+            return None
+        places = np.concatenate([start + np.arange(length) for start, length in zip(
+            [*(start for start, _ in self._near), self._total], [*lengths, missing])])
+        green = _block_diagonal([_green(length) for length in (*lengths, missing)])
+        joint = green @ self._curvature[:, np.abs(places[:, None] - places)] @ green.T
+        before, known = joint[:, :-missing, :-missing], joint[:, -missing:, :-missing]
+        size = before.max(axis=(1, 2))
+        before += _RIDGE * np.where(size > 0, size, 1.0)[:, None, None] * np.eye(len(before[0]))
+        weights = np.linalg.solve(before, known.transpose(0, 2, 1)).transpose(0, 2, 1)
+        return weights @ np.concatenate([near for _, near in self._near], axis=1)
+
+    def forget(self):
+        """What comes does not follow what was."""
+        self._near.clear()
+
+
+def _rest(roots, known):
+    """Roots of what is left of each covariance beside an ensemble (3, m, MEMBERS)."""
+    left = [root @ root.T - own @ own.T / MEMBERS for root, own in zip(roots, known)]
+    size, directions = np.linalg.eigh(left)
+    return directions * np.sqrt(np.maximum(size, 0.0))[:, None]
+
+
+@functools.cache
+def _green(missing):
+    """Error of a bridge by the second differences at its samples, up to the sign, (m, m)."""
+    at = np.arange(1, missing + 1)
+    whole = missing + 1
+    return np.minimum.outer(at, at) * (whole - np.maximum.outer(at, at)) / whole
+
+
+def _block_diagonal(blocks):
+    ends = np.cumsum([len(block) for block in blocks])
+    result = np.zeros((ends[-1], ends[-1]))
+    for end, block in zip(ends, blocks):
+        result[end - len(block):end, end - len(block):end] = block
+    return result
+
+
+def _curvature(values):
+    """Autocovariance (3, lags) of the second difference; samples (n, 3), NaN where missing."""
+    bend = np.diff(values, 2, axis=0)
+    there = ~np.isnan(bend[:, 0])
+    lags = _NEAR + _SHORT + 1
+    length = 1 << int(np.ceil(np.log2(len(there) + lags + 1)))
+    power = np.abs(np.fft.rfft(np.where(there[:, None], bend, 0.0), length, axis=0))**2
+    pairs = np.fft.irfft(np.abs(np.fft.rfft(there, length))**2)[:lags]
+    covariance = np.fft.irfft(power, axis=0)[:lags].T / np.maximum(np.round(pairs), 1)
+    # from few pairs each lag is off by itself: nothing has such a spectrum
+    taper = np.cos(np.pi / 2 * np.arange(lags) / lags)**2
+    spectrum = np.fft.hfft(covariance * taper, axis=1)
+    return np.fft.ihfft(np.maximum(spectrum, 0.0), axis=1).real
 
 
 def _structure(values, lags):

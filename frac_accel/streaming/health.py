@@ -11,6 +11,8 @@ OK, WARN, ERROR = range(3)
 
 # A topic is silent after this long without a message [s].
 SILENT_AFTER_S = 2.0
+# Shorter times [s] without a message say nothing.
+_SOME_S = 0.5
 # The stamps' rate may be off the stated one by this share.
 RATE_SHARE = 0.05
 _BUSY = 0.9
@@ -187,7 +189,8 @@ def _no_output(s):
         return None
     received = changes.get("samples", 0) + changes.get("other_publisher", 0)
     idle = not (received or changes.get("malformed") or s.designing)
-    if idle and s.seconds_since_message is not None:
+    is_late = s.seconds_since_message is not None and s.seconds_since_message >= _SOME_S
+    if idle and is_late:
         return WARN, f"no message on {s.topic} for {s.seconds_since_message:.1f} s"
     grave = _grave(s)
     if changes.get("faulty") and grave:
@@ -208,6 +211,8 @@ def _no_output(s):
         return ERROR, f"all {received} samples of the last second were dropped: {causes}{hint}"
     if s.sample_rate_hz is None:
         return _no_rate(s)
+    if idle and s.seconds_since_message is not None:
+        return None  # a busy machine looks twice in a row: nothing can have come in between
     if changes.get("restarts", 0) > 1:
         return ERROR, (f"the filter started anew {changes['restarts']} times in the last second "
                        "because of gaps in the stamps: samples are lost, or sample_rate_hz is "

@@ -31,8 +31,9 @@ MOVES, JUMPS = 8.0, 4.0
 REPEATED, HELD_FRAMES = 0.3, 5
 CLEAR_FRAMES = 10
 _NOISE_SHARE, _OTHER_SHARE = 1e-3, 1e-6
-# Share of repetitions from which on an axis is used to them, and how slowly that is learnt.
-_USED_TO, _LEARNS = 0.1, 0.05
+# Share of repetitions from which on an axis is used to them, how slowly that is learnt, and by how
+# many frames it is believed at the start: two seconds tell that it is not.
+_USED_TO, _LEARNS, _PRIOR = 0.1, 0.05, 3
 NOT_CONNECTED = "not connected"
 FAULTS = ("", "dead", "stuck", "saturated", "held", "too fast", NOT_CONNECTED)
 
@@ -65,8 +66,8 @@ class AxisMonitors:
         self._last = None
         self._only_zero = np.ones(3, bool)
         self._lattice = np.full(3, np.inf)
-        # coarse until it has shown that it is not
-        self._repeats = np.ones(3)
+        # coarse until it has shown that it is not, in frames in which it was not still
+        self._repeats, self._frames = np.ones(3), np.zeros(3)
         self._still_s, self._moved_s = np.zeros(3), np.zeros(3)
         self._still_at = np.full(3, np.nan)
         self._at_limit, self._held = np.zeros(3, int), np.zeros(3, int)
@@ -159,8 +160,10 @@ class AxisMonitors:
         self._moved_s = np.where(still, self._moved_s + self._frame_s * others_move, 0.0)
         used_to = self._repeats > _USED_TO
         # a still axis says nothing of what it is used to
+        learns = np.maximum(_LEARNS, 1 / (self._frames + _PRIOR))
         self._repeats = np.where(still, self._repeats,
-                                 self._repeats + _LEARNS * (repeated - self._repeats))
+                                 self._repeats + learns * (repeated - self._repeats))
+        self._frames += ~still
         needed = np.where(used_to, COARSE_S, STUCK_S) * (1 - 1e-9)
         stuck = (self._moved_s >= needed) | (self._still_s >= LONG_S)
         found[stuck] = np.where(np.abs(frame[:, -1]) <= tolerance, 1, 2)[stuck]

@@ -177,6 +177,7 @@ class SampleClock:
         self._last, self._last_values = int(stamp), values
         self._backward = 0
         self._place += 1
+        self._errors.forget()
         self._errors.add(values[None])
 
     def _accept(self, stamps, values, finite):

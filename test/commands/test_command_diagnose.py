@@ -244,3 +244,15 @@ def test_unrelated_reference_is_refused_without_a_model_too(files, tmp_path, cap
         values=noise(samples.values.shape)))
     assert main(["diagnose", source]) == 2
     assert "nothing to do with the reference" in capsys.readouterr().err
+
+
+def test_a_refusal_names_the_bag(tmp_path, capsys):
+    from frac_accel import Samples
+    stamps = 10**18 + np.arange(3000) * 10**6
+    stamps[2000:] += 3600 * 10**9
+    values = np.random.default_rng(0).normal(size=(3000, 3))
+    bag = tmp_path / "jumps.mcap"
+    write_bag(bag, {"/imu/reference": Samples.of(stamps, values),
+                    "/imu/data_raw": Samples.of(stamps, values)})
+    assert main(["diagnose", str(bag)]) == 2
+    assert capsys.readouterr().err.startswith(f"frac_accel diagnose: {bag}: reference: ")

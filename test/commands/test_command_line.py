@@ -95,15 +95,23 @@ def test_each_help_has_examples_that_can_be_given(verb, capsys):
         assert parser.parse_args(arguments).verb == verb
 
 
-def test_help_loads_no_numerical_library():
+@pytest.mark.parametrize("verb", ["", *VERBS])
+def test_help_loads_no_numerical_library(verb):
     """Which would cost more than all else that it does."""
+    heavy = {"numpy", "scipy", "yaml", "tqdm", "plotly", "pyarrow",
+             *({"difflib", "importlib.metadata"} if not verb else ())}
     code = ("import sys; from frac_accel.cli import main\n"
-            "try: main(['--help'])\n"
-            "except SystemExit: print({'numpy', 'scipy', 'yaml', 'tqdm', 'difflib', "
-            "'importlib.metadata'} & set(sys.modules))")
+            f"try: main([*{[verb] if verb else []}, '--help'])\n"
+            f"except SystemExit: print({heavy} & {{*sys.modules}})")
     result = subprocess.run([sys.executable, "-S", "-c", code], capture_output=True, text=True,
                             cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)})
     assert result.stdout.splitlines()[-1] == "set()", result.stderr
+
+
+def test_the_structures_on_offer_are_those_of_the_identification():
+    from frac_accel.commands._common import STRUCTURES
+    from frac_accel.identification import STRUCTURES as there
+    assert STRUCTURES == there
 
 
 @pytest.fixture(scope="module")

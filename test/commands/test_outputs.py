@@ -186,6 +186,99 @@ def test_together_is_all_or_none(tmp_path, monkeypatch, existing):
             (tmp_path / name).write_bytes(data)
 
 
+# What changes anything on the disk, by module.
+STEPS = [(os, name) for name in ("fsync", "replace", "link", "mkdir", "unlink", "rmdir")]
+
+
+def killed_at(step, work):
+    """Whether a process was killed before this one of its calls that change the disk."""
+    child = os.fork()
+    if child:
+        return os.waitpid(child, 0)[1] == signal.SIGKILL
+    count = 0
+
+    def counted(function):
+        def call(*arguments, **options):
+            nonlocal count
+            count += 1
+            if count == step:
+                os.kill(os.getpid(), signal.SIGKILL)
+            return function(*arguments, **options)
+        return call
+    try:
+        for module, name in STEPS:
+            setattr(module, name, counted(getattr(module, name)))
+        work()
+    finally:
+        os._exit(0)
+
+
+@pytest.mark.parametrize("found_by", ["here", "there"])
+@pytest.mark.parametrize("existing", [False, True])
+def test_a_kill_between_the_renames_is_finished_by_the_next_run(tmp_path, existing, found_by):
+    names = ["here/a.json", "there/b.html", "here/c"]
+    for folder in ("here", "there"):
+        (tmp_path / folder).mkdir()
+
+    def begin():
+        for name in names:
+            (tmp_path / name).unlink(missing_ok=True)
+            if existing:
+                (tmp_path / name).write_text(f"old {name}")
+        return content(tmp_path)
+
+    def write_all():
+        with outputs.together():
+            for name in names:
+                outputs.write_text(tmp_path / name, f"new {name}")
+
+    new = {name: f"new {name}".encode() for name in names}
+    before, step, seen = begin(), 1, []
+    while killed_at(step, write_all):
+        half = {name: (tmp_path / name).read_bytes() for name in names
+                if (tmp_path / name).exists()}
+        outputs.sweep(tmp_path / found_by)
+        now = {name: data for name, data in content(tmp_path).items() if name in names}
+        assert now in (before, new)
+        seen.append((half in (before, new), now == new))
+        for folder in ("here", "there"):
+            outputs.sweep(tmp_path / folder)
+        assert content(tmp_path) == now
+        assert begin() == before
+        step += 1
+    assert content(tmp_path) == new
+    # some were killed before, some between and some after the renames
+    assert {(True, False), (False, True), (True, True)} == {*seen}
+
+
+def test_what_somebody_has_changed_since_is_not_finished(tmp_path):
+    def write_all():
+        with outputs.together():
+            for name in "ab":
+                outputs.write_text(tmp_path / name, f"new {name}")
+    step = 1
+    while killed_at(step, write_all) and not (tmp_path / "a").exists():
+        shutil.rmtree(tmp_path)
+        tmp_path.mkdir()
+        step += 1
+    (tmp_path / "b").write_text("somebody's")
+    outputs.sweep(tmp_path)
+    assert content(tmp_path) == {"a": b"new a", "b": b"somebody's"}
+
+
+@pytest.mark.parametrize("mode, followed", [(0o777, []), (0o770, []), (0o700, ["victim"])])
+def test_a_list_that_others_may_have_written_is_not_followed(tmp_path, mode, followed):
+    folder = tmp_path / ".frac_accel-x.partial"
+    folder.mkdir(mode=0o700)
+    (folder / "victim").write_text("evil")
+    found = os.stat(folder / "victim")
+    (folder / ".frac_accel-list").write_text(json.dumps(
+        [[str(folder / "victim"), [found.st_dev, found.st_ino], None]]))
+    folder.chmod(mode)
+    outputs.sweep(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == followed
+
+
 def test_without_hard_links_what_was_replaced_still_comes_back(tmp_path, monkeypatch):
     def link(*arguments, **options):
         raise OSError(1, "Operation not permitted")

@@ -91,10 +91,10 @@ def failing(monkeypatch):
 
 def compute_once(monkeypatch):
     """The work before the writing is the same each time."""
-    for where, name in (("commands.identify", "identify"), ("commands.diagnose", "diagnose"),
-                        ("commands.paper", "reproduce"), ("commands.validate", "validate"),
-                        ("commands.simulate", "simulate"), ("commands.budget", "left_by"),
-                        ("commands.identify", "identification_page"),
+    for where, name in (("identification", "identify"), ("diagnosis", "diagnose"),
+                        ("paper", "reproduce"), ("validation", "validate"),
+                        ("simulation", "simulate"), ("budget", "left_by"),
+                        ("report.identification", "identification_page"),
                         ("report.diagnosis", "diagnosis_page"), ("report.paper", "paper_page")):
         module = importlib.import_module(f"frac_accel.{where}")
         monkeypatch.setattr(module, name, _once(getattr(module, name)))

@@ -302,3 +302,29 @@ def test_plateau_of_an_oscillator_is_its_sensitivity_in_any_band():
             "core": {"natural_frequency_hz": 300.0, "damping_ratio": 0.1,
                      "sensitivity": sensitivity}})
         assert plateau(model.axis("x"), [250.0, 600.0]) == sensitivity
+
+
+def test_a_sensor_far_below_the_rate_costs_no_more_than_its_taps():
+    """Taps by the ten thousand, with a spring: seconds, where all sums in full take a minute."""
+    import time
+    model = SensorModel.from_dict({
+        "schema": "frac_accel/sensor_model/1",
+        "core": {"natural_frequency_hz": 2.0, "damping_ratio": 0.3},
+        "effects": [{"cause": "cubic_stiffness", "alpha3": 1e-3}]})
+    start = time.process_time()
+    design = design_inverse(model, 500.0, bandwidth_hz=0.05)
+    assert time.process_time() - start < 8
+    assert design.warm_up_samples > 40_000
+
+
+@pytest.mark.parametrize("unknowns, step", [(4, 1), (7, 2), (9, 7), (20, 150)])
+def test_taps_that_vary_slowly_are_sums_of_their_kernels(unknowns, step):
+    from frac_accel.correction.fitting import _SmoothTaps
+    taps = _SmoothTaps(unknowns, step)
+    values = np.random.default_rng(0).normal(size=unknowns)
+    sparse = np.zeros((unknowns - 1) * step + 1)
+    sparse[::step] = values
+    whole = np.convolve(sparse, taps.kernel())
+    np.testing.assert_allclose(taps.taps(values), whole, atol=1e-15)
+    z = np.exp(-2j * np.pi * np.r_[0, 1e-9, np.geomspace(1e-6, 0.5, 100)])
+    np.testing.assert_allclose(taps.columns(z) @ values, np.polyval(whole[::-1], z), atol=1e-12)

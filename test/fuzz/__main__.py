@@ -19,6 +19,7 @@ def main():
                         "go wrong (default: %(default)s)")
     parser.add_argument("--live", action="store_true", help="models for a corrector at work, "
                         "instead of inputs for commands")
+    parser.add_argument("--node", action="store_true", help="the same, for one node over DDS")
     chosen = parser.parse_args()
     first = secrets.randbits(40) if chosen.first is None else chosen.first
     numbers = itertools.count(first) if chosen.count is None else (
@@ -34,8 +35,13 @@ def main():
 
     found = None
     try:
-        found = runner.run(numbers, Path(chosen.keep), told,
-                           live.judge if chosen.live else runner.judge)
+        if chosen.node:
+            # needs rclpy
+            from . import live_node
+            found = live_node.run(numbers, Path(chosen.keep), told)
+        else:
+            found = runner.run(numbers, Path(chosen.keep), told,
+                               live.judge if chosen.live else runner.judge)
     except KeyboardInterrupt:
         pass
     print(f"{counts.total()} cases from {first} on")

@@ -6,16 +6,16 @@ import numpy as np
 import yaml
 
 from frac_accel.io.bag import Samples, write_bag
+from frac_accel.paper import BAGS
 
 from . import damage, seeds
 
 # How often each command has its turn; those without an entry read no such input, with the reason.
 SHARES = {"correct": 0.3, "simulate": 0.2, "validate": 0.2, "identify": 0.15, "diagnose": 0.1,
           "budget": 0.05}
-# Those whose number this divides.
-BY_NUMBER = {"report": 10}
-WITHOUT = {"paper": "its study takes minutes; it reads bags as identify and diagnose do",
-           "bench": "it reads no file",
+# Those whose number leaves so much when it is divided by that.
+BY_NUMBER = {"report": (0, 10), "paper": (17, 100)}
+WITHOUT = {"bench": "it reads no file",
            "convert": "it reads as the others do, and test_formats damages the other formats",
            "layout": "it reads no file", "watch": "it reads topics",
            "completion": "it reads no file",
@@ -37,8 +37,10 @@ def make(number, folder):
         Which damage it is.
     """
     rng = np.random.default_rng(number)
-    if number % BY_NUMBER["report"] == 0:
-        return _report(folder, rng)
+    for name, special in (("report", _report), ("paper", _paper)):
+        rest, divisor = BY_NUMBER[name]
+        if number % divisor == rest:
+            return special(folder, rng)
     verb = _choice(SHARES, rng)
     what = _choice(DAMAGES, rng)
     if verb == "identify" and what.startswith("model"):
@@ -83,6 +85,27 @@ def _report(folder, rng):
         content = damage.text(json.dumps(data, indent=1), rng)
     source.write_bytes(content)
     return ["report", str(source), "-o", str(page)], [page], f"report, {what}"
+
+
+def _paper(folder, rng):
+    """Outputs that cannot be, or a bag that cannot be read: with bags that can, the study takes
+    minutes."""
+    outputs, arguments = [folder / "p.json"], ["paper", "--json", str(folder / "p.json")]
+    if rng.random() < 0.3:
+        outputs.append(folder / "p.html")
+        arguments += ["--report", str(outputs[1])]
+    if rng.random() < 0.5:
+        what = _choice(dict.fromkeys(damage.PLACES, 1), rng)
+        damage.place(outputs[rng.integers(len(outputs))], what, rng)
+        return [*arguments, "--quick"], outputs, f"paper, output {what}"
+    what = _choice(dict.fromkeys(damage.UNREADABLE, 1), rng)
+    bags = sorted(BAGS.glob("paper_bench*.mcap"))
+    hit = bags[rng.integers(len(bags))]
+    for bag in bags:
+        if bag != hit:
+            (folder / bag.name).symlink_to(bag)
+    damage.unreadable(folder / hit.name, hit.read_bytes(), what, rng)
+    return [*arguments, "--bags", str(folder)], outputs, f"paper, bag {what}"
 
 
 def _choice(shares, rng):

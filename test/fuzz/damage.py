@@ -1,6 +1,7 @@
 """Ways to damage a text, a tree, bytes, a bag's records, and samples; each from a generator."""
 
 import copy
+import os
 import struct
 import zlib
 
@@ -249,3 +250,34 @@ def samples(content, rng):
                                   ).astype(np.int64)
     stamps = np.clip(stamps, 0, (2**31 - 1) * 10**9)
     return content._replace(stamps_ns=stamps, values=values, variance=variance)
+
+
+PLACES = ("existing file", "folder", "link to nothing", "file in a file's place", "nothing")
+UNREADABLE = ("missing", "empty", "cut off", "noise", "folder", "pipe", "link to itself")
+
+
+def place(path, what, rng):
+    """Put something where an output is to be."""
+    if what == "existing file":
+        path.write_bytes(rng.bytes(100))
+    elif what == "folder":
+        path.mkdir()
+        (path / "of others").write_bytes(rng.bytes(100))
+    elif what == "link to nothing":
+        path.symlink_to("nowhere")
+    elif what == "file in a file's place":
+        path.symlink_to("place/nowhere")
+        (path.parent / "place").write_bytes(b"a file")
+
+
+def unreadable(path, content, what, rng):
+    """Something that is no bag, made of one."""
+    if what == "folder":
+        path.mkdir()
+    elif what == "pipe":
+        os.mkfifo(path)
+    elif what == "link to itself":
+        path.symlink_to(path.name)
+    elif what != "missing":
+        path.write_bytes({"empty": b"", "cut off": content[:rng.integers(1, 200)],
+                          "noise": rng.bytes(rng.integers(1, 3000))}[what])

@@ -56,6 +56,10 @@ def judge(number, folder):
     seconds = time.process_time() - start
     said = [line for line in err.getvalue().splitlines() if not line.startswith("warning: ")]
     after = _contents(folder)
+    if status == 0:
+        # what was there under an output's name
+        before = {name: told for name, told in before.items()
+                  if folder / name not in outputs}
     wrong = []
     if status not in (0, 2):
         wrong.append(f"status {status}: {' '.join(said)[-300:]}")
@@ -76,7 +80,7 @@ def judge(number, folder):
     if made - expected or expected - made - {"extended.yaml"}:
         wrong.append(f"made {sorted(made)}, expected {sorted(expected)}")
     wrong += [f"output {path.name}: {trouble}" for path in outputs
-              for trouble in [_trouble(path)] if trouble]
+              if status == 0 for trouble in [_trouble(path)] if trouble]
     return what, status, wrong
 
 

@@ -15,7 +15,7 @@ from frac_accel import read_bag, write_bag
 from frac_accel.cli import main
 from frac_accel.errors import BagError
 from frac_accel.io import cdr, formats
-from frac_accel.io.bag import BagReader, Temperatures, read_temperature
+from frac_accel.io.bag import BagReader, BagWriter, Temperatures, read_temperature
 
 for library in ("pyarrow", "asammdf", "rosbags"):
     pytest.importorskip(library, reason="the extra `formats` is in .venv only")
@@ -53,9 +53,38 @@ def test_there_and_back(end, bag, folder, capsys):
         found = read_bag(path)
         assert found.keys() == TOPICS.keys()
         for topic, samples in TOPICS.items():
-            # MDF has no place for a frame
-            frame = samples.frame_id if end != "mf4" else "accel_link"
-            assert_equal(found[topic], samples._replace(frame_id=frame))
+            assert_equal(found[topic], samples)
+
+
+@pytest.mark.parametrize("end", ["csv", "parquet", "npz", "mf4"])
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_a_covariance_that_is_not_diagonal_comes_back_whole(end, symmetric, folder):
+    rng = np.random.default_rng(6)
+    covariance = rng.uniform(0.1, 1.0, (50, 3, 3))
+    if symmetric:
+        covariance = covariance @ covariance.transpose(0, 2, 1)
+    covariance[7] = 0.0  # unknown
+    samples = random_samples(5, 50, "<seat> & rail")
+    messages = [bytearray(message) for message in cdr.encode_samples(cdr.IMU, samples)]
+    for message, own in zip(messages, covariance):
+        message[-72:] = own.astype("<f8").tobytes()
+    with BagWriter("bag.mcap") as writer:
+        writer.add_topic("/imu/data_raw", cdr.IMU)
+        for message, stamp in zip(messages, samples.stamps_ns.tolist()):
+            writer.write("/imu/data_raw", bytes(message), stamp)
+    write_bag("diagonal.mcap", {"/imu/data_raw": random_samples(5, 50)})
+    assert main(["convert", "bag.mcap", "-o", f"there.{end}"]) == 0
+    assert main(["convert", f"there.{end}", "-o", "back.mcap"]) == 0
+    back = [message.data for message in BagReader("back.mcap").messages()]
+    found = cdr.read_covariances(back)
+    np.testing.assert_array_equal(found, covariance.reshape(50, 9))
+    assert_equal(read_bag("back.mcap")["/imu/data_raw"], read_bag("bag.mcap")["/imu/data_raw"])
+    # three more columns, or six; none where the diagonal is all
+    assert main(["convert", "diagonal.mcap", "-o", "diagonal.csv"]) == 0
+    assert "covariance" not in (folder / "diagonal.csv").read_text()
+    if end == "csv":
+        names = (folder / "there.csv").read_text().partition("\n")[0]
+        assert names.count("covariance_") == (3 if symmetric else 6)
 
 
 def test_a_database_of_rosbag2_keeps_every_message(folder, bag):
@@ -261,6 +290,19 @@ def test_damage_is_one_line_or_none(end, folder, capfd):
         assert len(capfd.readouterr().err.splitlines()) <= 1
 
 
+def test_a_file_that_ends_its_reader_is_refused(folder, monkeypatch, capfd):
+    """As some damaged MDF files do in asammdf's compiled part."""
+    import os
+    import signal
+
+    from frac_accel.io.formats import mdf
+    (folder / "in.mf4").write_bytes(b"MDF     4.10    ")
+    monkeypatch.setattr(mdf, "_read", lambda path: os.kill(os.getpid(), signal.SIGSEGV))
+    assert main(["convert", "in.mf4", "-o", "out.mcap"]) == 2
+    line, = capfd.readouterr().err.splitlines()
+    assert "in.mf4: cannot be read: it is damaged" in line
+
+
 @pytest.mark.parametrize("end", ["npz", "parquet"])
 def test_small_files_that_unpack_to_too_much_are_refused(end, folder, monkeypatch):
     import pyarrow
@@ -293,7 +335,6 @@ def test_a_missing_library_is_named(folder, monkeypatch):
 
 
 def test_what_a_table_cannot_hold_is_said(folder, capsys):
-    from frac_accel.io.bag import BagWriter
     with BagWriter("bag.mcap") as writer:
         writer.add_topic("/note", "std_msgs/msg/String")
         writer.add_topic("/imu/data_raw", cdr.IMU)

@@ -88,6 +88,13 @@ def test_no_file_stops_or_stalls_the_node(tmp_path):
     np.testing.assert_array_equal(np.diff(stamps), 2_000_000)
 
 
+def test_damaged_models_are_taken_or_refused_by_the_node():
+    from fuzz import live_node
+    seen = []
+    assert live_node.run(range(3), None, lambda *told: seen.append(told[2])) == {}
+    assert len(seen) == 3
+
+
 def test_a_model_that_may_not_change_does_not(tmp_path):
     with ros_domain() as environment, Probe(environment) as probe, \
             running(tmp_path, environment, allow_model_changes=False) as node:

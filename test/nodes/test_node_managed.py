@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from builtin_interfaces.msg import Time
-from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.msg import Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -91,9 +91,14 @@ def test_life_of_a_managed_corrector(tmp_path):
         assert "missing.yaml" in node.text and "Traceback" not in node.text
         assert state(probe) == "unconfigured"
         assert probe.set_parameter("corrector", "model_file", str(model)).successful
-        received = probe.collect(Imu, "/imu/data")
+        received, states = probe.collect(Imu, "/imu/data"), []
+        probe.node.create_subscription(
+            TransitionEvent, "/corrector/transition_event",
+            lambda event: states.append((event.start_state.label, event.goal_state.label)), 10)
         for _ in range(2):  # a second life is as the first
             live(probe, node, model, raw, received)
+        # what launch/managed.launch.py waits for
+        assert states.count(("configuring", "inactive")) == 2
         assert change(probe, "shutdown")
         assert node.wait() == 0
 

@@ -61,22 +61,61 @@ def entities(name, monkeypatch):
     return found
 
 
+def handlers(found, name):
+    """The event handlers of a class."""
+    return [handler.arguments[0] for handler in found["RegisterEventHandler"]
+            if type(handler.arguments[0]).__name__ == name]
+
+
 def exit_handler(found):
     """What the only handler of a process's end is called with, and its action."""
-    handler, = found["RegisterEventHandler"]
-    on_process_exit, = handler.arguments
+    on_process_exit, = handlers(found, "OnProcessExit")
     return on_process_exit.keywords["on_exit"], on_process_exit.keywords["target_action"]
 
 
-def test_what_cannot_run_is_not_started_again(monkeypatch):
-    found = entities("vehicle.launch.py", monkeypatch)
+@pytest.mark.parametrize("name, kind", [("vehicle", "Node"), ("managed", "LifecycleNode"),
+                                        ("diagnoser", "Node")])
+def test_what_cannot_run_is_not_started_again(name, kind, monkeypatch):
+    found = entities(f"{name}.launch.py", monkeypatch)
     on_exit, action = exit_handler(found)
-    assert action is found["Node"][0] and action.keywords["respawn"] is True
+    assert action is found[kind][0] and action.keywords["respawn"] is True
     for status in (0, 1, -6, -9):
         assert on_exit(types.SimpleNamespace(returncode=status), None) is None
     event = on_exit(types.SimpleNamespace(returncode=2), None)[-1].keywords["event"]
     assert type(event).__name__ == "ShutdownProcess"
     assert event.keywords["process_matcher"] is action
+
+
+def test_the_managed_corrector_is_configured_and_then_activated(monkeypatch):
+    """By the events that `test_node_managed` sees the node send."""
+    from lifecycle_msgs.msg import Transition
+    found = entities("managed.launch.py", monkeypatch)
+    node, = found["LifecycleNode"]
+    assert node.keywords["executable"] == "managed_corrector"
+    started, = handlers(found, "OnProcessStart")
+    configured, = handlers(found, "OnStateTransition")
+    assert started.keywords["target_action"] is node
+    assert configured.keywords["target_lifecycle_node"] is node
+    assert (configured.keywords["start_state"], configured.keywords["goal_state"]) == (
+        "configuring", "inactive")
+    for asked, transition in ((started.keywords["on_start"], Transition.TRANSITION_CONFIGURE),
+                              (configured.keywords["entities"], Transition.TRANSITION_ACTIVATE)):
+        event = asked[0].keywords["event"]
+        assert type(event).__name__ == "ChangeState"
+        assert event.keywords == {"lifecycle_node_matcher": node, "transition_id": transition}
+        assert asked[0].keywords["condition"].arguments[0].arguments == ("autostart",)
+
+
+def test_the_diagnoser_has_its_own_parameters_and_watches_what_the_corrector_reads(monkeypatch):
+    found = entities("diagnoser.launch.py", monkeypatch)
+    node, = found["Node"]
+    assert node.keywords["executable"] == "diagnoser"
+    assert {"model_file", "results", "axis", "corrector"} <= node.keywords["parameters"][1].keys()
+    assert [name for name, _ in node.keywords["remappings"]] == ["imu/data_raw", "imu/reference"]
+    defaults = {each.arguments[0]: each.keywords.get("default_value")
+                for each in found["DeclareLaunchArgument"]}
+    assert defaults["raw_topic"] == "imu/data_raw" and "model_file" in defaults
+    assert defaults["params_file"].arguments[0][1:] == ["config", "diagnoser.yaml"]
 
 
 def test_a_bag_that_was_not_played_is_no_success(monkeypatch):

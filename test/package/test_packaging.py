@@ -192,17 +192,20 @@ def declared_arguments(tree, function):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == function}
 
 
+LAUNCHED = ["bench.launch.py", "diagnoser.launch.py", "managed.launch.py", "vehicle.launch.py"]
+
+
 def node_calls(tree):
     """Executable and names of the own parameters of every ``Node(...)`` in a syntax tree."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Node":
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("Node", "LifecycleNode"):
             keywords = {keyword.arg: keyword.value for keyword in node.keywords}
             names = [key.value for element in keywords["parameters"].elts
                      if isinstance(element, ast.Dict) for key in element.keys]
             yield keywords["executable"].value, names
 
 
-@pytest.mark.parametrize("name", ["bench.launch.py", "vehicle.launch.py"])
+@pytest.mark.parametrize("name", LAUNCHED)
 def test_launch_file_uses_each_argument_that_it_declares(name):
     tree = ast.parse((ROOT / "launch" / name).read_text())
     declared = declared_arguments(tree, "DeclareLaunchArgument")
@@ -222,7 +225,7 @@ def test_on_a_vehicle_a_corrector_that_has_died_is_started_again():
     assert ast.literal_eval(given["respawn_delay"]) <= 2.0
 
 
-@pytest.mark.parametrize("name", ["bench.launch.py", "vehicle.launch.py"])
+@pytest.mark.parametrize("name", LAUNCHED)
 def test_launch_file_is_a_description(name):
     pytest.importorskip("launch_ros", reason="launch comes with an installed ROS only")
     namespace = runpy.run_path(ROOT / "launch" / name)

@@ -57,6 +57,16 @@ def broken(kind, values):
     return values
 
 
+@pytest.mark.parametrize("value", [0.0, 0.7])
+def test_an_axis_that_fails_two_seconds_after_the_start_is_named_at_once(value):
+    values = motion(2)
+    start = int(2.2 * RATE)
+    values[start:, 1] = value
+    kernel = corrector(noise_std=0.02)
+    (index, _, variance), _ = run(kernel, values)
+    assert (variance[index > start + 0.5 * RATE, 1] == DISTRUSTED).all()
+
+
 @pytest.mark.parametrize("kind, word, effects", [
     ("dead", "dead", ()), ("stuck", "stuck", ()), ("dithered", "stuck", ()), ("held", "held", ()),
     ("saturated", "saturated", [{"cause": "clipping", "lower": -4.0, "upper": 4.0},

@@ -24,6 +24,13 @@ def test_all_is_well():
     assert judge(GOOD) == (OK, "correcting at 2000 Hz")
 
 
+def test_two_looks_in_a_row_are_no_silence():
+    """As a timer that was late takes them."""
+    assert judge(changed(changes={}, seconds_since_message=0.02))[0] == OK
+    assert "are zero" in judge(changed(changes={}, seconds_since_message=0.02,
+                                       zero_stamps=True))[1]
+
+
 @pytest.mark.parametrize("situation, level, words", [
     (changed(model_file=""), ERROR, "no model: set the parameter model_file"),
     (changed(failure="cannot be met"), ERROR, "no filter: cannot be met"),

@@ -17,6 +17,7 @@ from frac_accel.io.bag.reader import BagReader, Block, Message, TopicInfo
 from frac_accel.io.bag.writer import BagWriter
 from frac_accel.io.cdr import Temperatures
 from frac_accel.io.samples import Samples
+from frac_accel.io.topics import CORRECTED_TOPIC, RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC
 
 __all__ = [
     "REFERENCE_TOPIC",
@@ -36,12 +37,6 @@ __all__ = [
     "read_temperature",
     "write_bag",
 ]
-
-REFERENCE_TOPIC = "/imu/reference"
-RAW_TOPIC = "/imu/data_raw"
-CORRECTED_TOPIC = "/imu/data"
-TEMPERATURE_TOPIC = "/imu/temperature"
-
 
 def read_bag(path: str | Path, topics: Sequence[str] | None = None) -> dict[str, Samples]:
     """Samples of whole topics.

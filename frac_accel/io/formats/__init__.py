@@ -10,9 +10,12 @@ import shutil
 import tempfile
 from pathlib import Path
 
+import numpy as np
+
 from ...errors import BagError
 from ..outputs import at_once, stage
 from ..regular_file import open_regular
+from ..samples import Correlated
 from .columns import Wishes, split_unit, topics_of
 from .rosbag2 import is_sqlite, read_messages, write_sqlite
 
@@ -119,7 +122,8 @@ def _write_table(sources, infos, kind, target):
     for source in sources:
         for info in source.topics.values():
             if info.type_name in cdr.ACCELERATION_TYPES and info.count:
-                topics.update(read_bag(source.path, [info.name]))
+                samples = read_bag(source.path, [info.name])[info.name]
+                topics[info.name] = _correlated(source, info, samples)
             elif info.type_name == cdr.TEMPERATURE and info.count:
                 topics[info.name] = read_temperature(source.path, info.name)
             elif info.count:
@@ -131,6 +135,15 @@ def _write_table(sources, infos, kind, target):
     write = _function(*writers[kind])
     written, _ = _write_output(target, lambda path: write(path, topics), infos)
     return {name: written[name] for name in topics}, left_out
+
+
+def _correlated(source, info, samples):
+    """The samples with their whole covariance, where it is more than its diagonal."""
+    from ..bag import cdr
+    if info.type_name != cdr.IMU:
+        return samples
+    return Correlated.from_samples(samples, np.concatenate(
+        [cdr.read_covariances(block.messages) for block in source.blocks([info.name])]))
 
 
 def _write_output(target, write, infos):

@@ -16,10 +16,12 @@ import numpy as np
 from ...errors import BagError, FracAccelError
 from ..bag.mcap_file import allowed_bytes
 from ..cdr import Temperatures
-from ..samples import Samples
+from ..samples import Correlated, Samples
 from .units import acceleration_factor, celsius_offset, time_factor_ns
 
 _AXES = "xyz"
+# Places in a covariance row by row, beside its diagonal: the second three repeat the first.
+_ACROSS = {"xy": 1, "xz": 2, "yz": 5, "yx": 3, "zx": 6, "zy": 7}
 _UNSUSPECTED_BYTES = 256 * 2**20
 _UNIT = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]]*)[\])]\s*$")
 _SUFFIX = re.compile(r"^(?P<name>.+)_(?P<unit>ns|us|ms|s)$")
@@ -183,7 +185,21 @@ def _content(group, topic, fields, wishes):
         variance = _beside(group, topic, f"variance_{axis}")
         if variance is not None:
             variances[:, place] = factor**2 * _numbers(variance, f"variance_{axis}")[~empty]
-    return Samples(stamps, values, variances, frame)
+    samples = Samples(stamps, values, variances, frame)
+    return Correlated.from_samples(samples, _covariance(group, topic, samples, ~empty, factor))
+
+
+def _covariance(group, topic, samples, rows, factor):
+    """Covariance (n, 9) of a topic's samples; what the table does not say is 0."""
+    result = np.zeros((len(samples.values), 9))
+    result[:, ::4] = np.nan_to_num(samples.variance)
+    for name, place in _ACROSS.items():
+        column = _beside(group, topic, f"covariance_{name}")
+        if column is not None:
+            result[:, place] = factor**2 * np.nan_to_num(_numbers(column, name)[rows])
+        elif place in (3, 6, 7):
+            result[:, place] = result[:, _ACROSS[name[::-1]]]
+    return result
 
 
 def _stamps(group, topic, wishes, count):
@@ -269,5 +285,16 @@ def columns_of(content):
         pairs = [(f"{axis} [m/s^2]", content.values[:, i]) for i, axis in enumerate(_AXES)]
         pairs += [(f"variance_{axis} [(m/s^2)^2]", content.variance[:, i])
                   for i, axis in enumerate(_AXES)]
+        if isinstance(content, Correlated):
+            pairs += _across(content.covariance)
     return [("stamp [ns]", stamps), *((name, values) for name, values in pairs
                                       if not _is_empty(np.asarray(values)))]
+
+
+def _across(covariance):
+    """Columns of what is beside the diagonal: three, or six where it is not symmetric."""
+    upper, lower = list(_ACROSS.values())[:3], list(_ACROSS.values())[3:]
+    names = list(_ACROSS)
+    if np.array_equal(covariance[:, upper], covariance[:, lower]):
+        names = names[:3]
+    return [(f"covariance_{name} [(m/s^2)^2]", covariance[:, _ACROSS[name]]) for name in names]

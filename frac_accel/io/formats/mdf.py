@@ -1,8 +1,14 @@
-"""Measurement data format of ASAM (MDF4), by asammdf: a channel group for each topic."""
+"""Measurement data format of ASAM (MDF4), by asammdf: a channel group for each topic.
+
+The group's comment is the topic, and in a line of its own the frame.
+"""
 
 import datetime
+import faulthandler
 import gc
 import logging
+import multiprocessing
+import re
 import sys
 
 import numpy as np
@@ -12,10 +18,42 @@ from .columns import Group, columns_of
 
 _EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.timezone.utc)
 _VERSION = "4.10"
+_FRAME = re.compile(r"^frame_id: (.*)$", re.MULTILINE)
 
 
 def read_mdf(path):
-    """Groups of the channel groups, with the channels' units and the stamps of their masters."""
+    """Groups of the channel groups, with the channels' units and the stamps of their masters.
+
+    They are read in a process of its own: of damaged files, asammdf's compiled part ends some.
+    """
+    import asammdf  # noqa: F401  where it is missing, that is told by this process
+    context = multiprocessing.get_context("fork")
+    ours, theirs = context.Pipe(duplex=False)
+    reader = context.Process(target=_send, args=(theirs, path), daemon=True)
+    reader.start()
+    theirs.close()
+    try:
+        groups, error = ours.recv()
+    except EOFError:
+        groups, error = None, BagError(f"{path}: cannot be read: it is damaged, and ends asammdf")
+    finally:
+        ours.close()
+        reader.kill()
+        reader.join()
+    if error:
+        raise error
+    return groups
+
+
+def _send(pipe, path):
+    faulthandler.disable()
+    try:
+        pipe.send((_read(path), None))
+    except (BagError, OSError, MemoryError) as error:
+        pipe.send((None, error))
+
+
+def _read(path):
     mdf = _open(path)
     start = mdf.header.start_time
     start = start if start.tzinfo else start.replace(tzinfo=datetime.timezone.utc)
@@ -30,7 +68,9 @@ def read_mdf(path):
                 continue
             seconds = np.asarray(signals[0].timestamps, float)
             stamps = start_ns + np.round(seconds * 1e9).astype(np.int64)
+            frame = _FRAME.search(str(group.channel_group.comment))
             groups.append(Group.of([("stamp", stamps, "ns"), *(
+                [("frame_id", np.array([frame[1]]), "")] if frame else []), *(
                 (signal.name, signal.samples, signal.unit) for signal in signals
                 if signal.samples.ndim == 1 and signal.samples.dtype.kind in "fiu")]))
     except Exception as error:  # asammdf raises whatever its parts do
@@ -41,7 +81,7 @@ def read_mdf(path):
 
 
 def write_mdf(path, topics):
-    """Write topics; the frame is not kept."""
+    """Write topics."""
     from asammdf import MDF, Signal
     first = min((int(content.stamps_ns.min()) for content in topics.values()
                  if len(content.stamps_ns)), default=0)
@@ -52,7 +92,8 @@ def write_mdf(path, topics):
         (_, stamps), *columns = columns_of(content)
         seconds = (stamps - start_s * 10**9) * 1e-9
         mdf.append([_signal(Signal, f"{topic}/{name}", values, seconds) for name, values
-                    in columns], comment=topic, common_timebase=True)
+                    in columns], comment=f"{topic}\nframe_id: {content.frame_id}",
+                   common_timebase=True)
     mdf.save(path, overwrite=True)
     mdf.close()
 

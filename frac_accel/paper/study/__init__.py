@@ -9,6 +9,7 @@ levels and bandwidths.
 import dataclasses
 
 from ...identification.judge.residual_tests import p_words
+from ...record import Record
 from .answer import answer
 from .bench import SENSORS, SWEPT, bags_of, diagnosed, judge_sensor, refusal
 from .map import VERDICTS, cases, make_map, workers
@@ -91,6 +92,10 @@ def run_study(bags=None, progress=lambda words, share: None):
         If a bag is missing or cannot be read.
     """
     paths = bags_of(bags)
+    # a bag that is of no use is told now, not after minutes
+    for group in paths.values():
+        for path in group:
+            Record.load(path)
     # a cell of the map takes as long as about ten models with given orders
     swept = len(SWEPT) * (len(damping_orders()) + len(table_4()))
     total, done = 10 * len(cases()) + swept, 0
