@@ -5,6 +5,7 @@ is found that is not there. ``workers``: bags with workers killed at random, tim
 """
 
 import argparse
+import collections
 import json
 import os
 import random
@@ -17,20 +18,23 @@ from pathlib import Path
 
 import fleet_rig
 import numpy as np
+from scipy.stats import binomtest
 
+from frac_accel.fleet.estimates import Estimates
 from frac_accel.fleet.groups import groups_of
-from frac_accel.fleet.pooled import Estimates, odd_vehicles, weak_effects
+from frac_accel.fleet.peers import odd_vehicles
 from frac_accel.fleet.store import Store
+from frac_accel.fleet.weak_effects import weak_effects
 from frac_accel.model import SensorModel
 
 
-def pooling(vehicles, weak, draws):
+def pooling(vehicles, weak, draws, seed):
     """A lot of weak ones among as many vehicles, a cause after the other."""
-    rng, model = np.random.default_rng(23), SensorModel.from_dict(fleet_rig.model())
+    rng, model = np.random.default_rng(seed), SensorModel.from_dict(fleet_rig.model())
     causes = list(fleet_rig.CAUSES)
     fleet = [fleet_rig.ScreenedVehicle(
         fleet_rig.vehicle(rng, causes if i < weak else (), 3.0), model) for i in range(vehicles)]
-    found, named, wrong, odd, discoveries = 0, 0, 0, 0, 0
+    totals = collections.Counter()
     for draw in range(draws):
         cause = causes[draw % len(causes)]
         size = np.sqrt(30) / 4 / np.median([one.own_part(cause) for one in fleet[:weak]])
@@ -43,14 +47,16 @@ def pooling(vehicles, weak, draws):
         effects, rest = weak_effects(estimates, groups)
         right = [e for e in effects if e.group == "lot = B"
                  and (e.cause == cause or cause in e.confusable_with)]
-        found += bool(right)
-        named += bool(right) and right[0].cause == cause
-        wrong += len(effects) - len(right)
-        discoveries += len(effects)
-        odd += len(odd_vehicles(rest, list(range(vehicles))))
+        totals.update(found=bool(right), first=bool(right) and right[0].cause == cause,
+                      among=sum(1 + len(e.confusable_with) for e in right),
+                      false=len(effects) - len(right), discoveries=len(effects),
+                      odd=len(odd_vehicles(rest, list(range(vehicles)))))
         print(f"{cause}: {[(e.group, e.cause, e.confusable_with) for e in effects]}", flush=True)
-    print(f"{draws} draws, {weak} of {vehicles} vehicles: in {found} found in its lot, in {named} "
-          f"as the first cause; {wrong} of {discoveries} discoveries false; {odd} vehicles odd")
+    exact = binomtest(totals["false"], max(totals["discoveries"], 1)).proportion_ci()
+    print(f"{draws} draws, {weak} of {vehicles} vehicles: in {totals['found']} found in its lot, "
+          f"among {totals['among']} causes in all, in {totals['first']} as the first; "
+          f"{totals['false']} of {totals['discoveries']} discoveries false (95 %: {exact.low:.2%} "
+          f"to {exact.high:.2%}); {totals['odd']} vehicles odd")
 
 
 def workers(count):
@@ -110,10 +116,11 @@ def main():
     parser.add_argument("--vehicles", type=int, default=300)
     parser.add_argument("--weak", type=int, default=30)
     parser.add_argument("--draws", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=23)
     parser.add_argument("--bags", type=int, default=10_000)
     chosen = parser.parse_args()
     if chosen.part == "pooling":
-        pooling(chosen.vehicles, chosen.weak, chosen.draws)
+        pooling(chosen.vehicles, chosen.weak, chosen.draws, chosen.seed)
     else:
         workers(chosen.bags)
 
