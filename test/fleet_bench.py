@@ -73,7 +73,7 @@ def _made(folder, count):
 def _told(results, count, words, verb="correct"):
     rows = Store(str(results), verb).read().to_pylist()
     hashes = {row["sha256"] for row in rows}
-    own_s = sum(row["cpu_s"] for row in rows)
+    own_s = sum(row["cpu_s"] or 0 for row in rows)
     print(f"{words}; {count - len(hashes)} lost, {len(rows) - len(hashes)} double, "
           f"{sum(bool(row['error']) for row in rows)} errors; {own_s:.1f} s of processor time for "
           f"the bags; at most {max(row['memory_mb'] for row in rows):.0f} MB a worker", flush=True)
