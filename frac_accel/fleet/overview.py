@@ -75,10 +75,7 @@ def weak_words(effect):
     """A weak effect in a line."""
     p = effect.pooled
     name = f"{effect.cause} {effect.parameter}".strip()
-    rivals = ""
-    if effect.confusable_with:
-        count = {1: "or", 2: "two of it and", 3: "several of it and"}[effect.at_work]
-        rivals = f"; {count} {', '.join(effect.confusable_with)}"
+    rivals = f"; {effect.rivals}" if effect.rivals else ""
     return (f"{effect.group}: {name} {p.mean:.4g} {_unit(effect.unit)}({p.low:.4g} to {p.high:.4g},"
             f" spread {p.spread:.2g}, {p.count} vehicles, p = {p.p_value:.1g}){rivals}")
 

@@ -48,6 +48,14 @@ class WeakEffect:
     confusable_with: list
     at_work: int = 1
 
+    @property
+    def rivals(self):
+        """The others in words; empty where there are none."""
+        if not self.confusable_with:
+            return ""
+        count = {1: "or", 2: "two of it and", 3: "several of it and"}[self.at_work]
+        return f"{count} {', '.join(self.confusable_with)}"
+
 
 def weak_effects(estimates, groups, rate=FALSE_DISCOVERY_RATE):
     """Causes that groups of vehicles show together, the clearest first.
