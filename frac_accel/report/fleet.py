@@ -8,8 +8,8 @@ from .page import Page
 _SHOWN = 500
 _FALSE_DISCOVERIES = (
     "Each cause is tested in each group that the given columns make. Of all that is shown here, at "
-    "most one per cent is expected to be wrong (Benjamini and Yekutieli). Effects are to first order "
-    "beside the model in use; all other causes that may be behind them are listed.")
+    "most one per cent is expected to be wrong (Benjamini and Yekutieli). Effects are to first "
+    "order beside the model in use; all other causes that may be behind them are listed.")
 
 
 def fleet_page(seen, command=""):
