@@ -26,9 +26,9 @@ _LEAST, _MOST = 1e-4, 0.1
 # Quantile of the density that white noise cannot exceed, and by how much an estimate may.
 _FLOOR, _SCATTERS = 0.05, 1.3
 # A floor: coherence with the sensor below which nothing is shared, share of the frequencies that
-# must have none, ratio of the densities there, and how far the sensor must stay below what motion
-# of that density would show.
-_SHARED, _WIDE, _EVEN, _SILENT = 0.2, 0.15, 2.0, 3.0
+# must have none, ratio of the densities there, and times what motion of that density would show in
+# the sensor (power) that it may have: such motion would make the coherence at least 1/3.
+_SHARED, _WIDE, _EVEN, _LOUDEST = 0.2, 0.15, 2.0, 2.0
 # Share of the floor that the median of the segments must have.
 _STEADY = 0.5
 # Relative uncertainty at least: no noise is white to better than that.
@@ -54,6 +54,8 @@ class ReferenceNoise:
         Whether it is enough to bend a fit; else it counts as noise only.
     frequency_hz, share : tuple of float
         W at some frequencies.
+    band_hz : float
+        Frequency [Hz] up to which the two are compared.
     """
 
     std: float
@@ -62,6 +64,7 @@ class ReferenceNoise:
     bends: bool
     frequency_hz: tuple
     share: tuple
+    band_hz: float = np.inf
 
     @property
     def words(self):
@@ -73,8 +76,8 @@ class ReferenceNoise:
                 "behind a filter that leaves as little of it as possible")
 
     def density(self, frequency_hz):
-        """Its density [(m/s²)²/Hz] at frequencies up to the Nyquist frequency, the last of them."""
-        return np.full(len(frequency_hz), self.std**2 / frequency_hz[-1])
+        """Its density [(m/s²)²/Hz], as far as it is compared, at some frequencies."""
+        return self.std**2 / self.frequency_hz[-1] * (frequency_hz <= self.band_hz)
 
 
 def reference_noise(record, column, used, covariance_std=None):
@@ -89,38 +92,62 @@ def reference_noise(record, column, used, covariance_std=None):
     covariance_std : float, optional
         What the reference's messages state [m/s²].
     """
-    rate = record.sampling_rate_hz
-    # on other instants noise is not white any more, and one topic lacks what is beyond the band
-    if record.resampled or used.sum() < 2 * _SEGMENTS:
+    rate, moved = record.sampling_rate_hz, "reference" in record.resampled
+    own_rate = record.topics[0].clock.rate_hz if moved else rate
+    # from uneven instants noise is not white any more
+    if used.sum() < 2 * _SEGMENTS or (moved and record.topics[0].clock.kind == "uneven"):
         return None
     one = record.reference[:, column]
     size = min(_LONGEST, len(one) // (_SEGMENTS // 2))
     frequency, own = welch(one, rate, nperseg=size)
-    # the ends: what the window makes of the mean, and half a line
-    inner = slice(2, -1)
+    inner = _inner(frequency, record)
     power = float(np.var(one))
-    lowest = np.quantile(own[inner], _FLOOR)
-    most = np.sqrt(lowest * rate / 2)
-    for std, by in _estimates(record, column, used, covariance_std, most, size):
-        if std is not None and std <= _SCATTERS * most and std**2 / power < _MOST:
-            share = np.clip(1 - 2 * std**2 / rate / own, 0.0, 1.0)
+    most = np.quantile(own[inner], _FLOOR)
+    if _given(covariance_std) and _untrusted(covariance_std, None,
+                                             _SCATTERS * np.sqrt(most * own_rate / 2)):
+        covariance_std = None
+    for density, by in _estimates(record, column, used, covariance_std, own_rate, size):
+        std = np.sqrt(density * own_rate / 2)
+        if density <= _SCATTERS**2 * most and density * rate / 2 / power < _MOST:
+            share = np.clip(1 - density / own, 0.0, 1.0)
             # a constant is no noise, and the first line holds what the window leaves of it
             share[:2] = 1.0, share[2]
+            # nothing is compared beyond the band
+            share[inner.stop:] = 0.0
             count = {"covariance": np.inf, "floor": _WIDE * len(one)}.get(by, len(one) / 4)
             known = max(1 / np.sqrt(2 * count), _AS_WHITE)
-            return ReferenceNoise(float(std), float(known * std), by, std**2 / power > _LEAST,
-                                  tuple(frequency.tolist()), tuple(share.tolist()))
+            # as far as its own Nyquist frequency
+            ends = (frequency[-1], own_rate / 2) if own_rate > rate else (own_rate / 2,)
+            return ReferenceNoise(
+                float(std), float(known * std), by, bool(density * rate / 2 / power > _LEAST),
+                (*frequency[frequency < ends[0]].tolist(), *ends),
+                (*share[frequency < ends[0]].tolist(), *share[[-1] * len(ends)].tolist()),
+                record.band_hz or np.inf)
     return None
 
 
-def _estimates(record, column, used, covariance_std, most, size):
-    """Pairs of a standard deviation (or None) and what shows it, the best first."""
+def _inner(frequency, record):
+    """Slice without the ends (what the window makes of the mean, half a line), within the band."""
+    return slice(2, min(np.searchsorted(frequency, record.band_hz or np.inf), len(frequency) - 1))
+
+
+def _estimates(record, column, used, covariance_std, own_rate, size):
+    """Pairs of a density [(m/s²)²/Hz] and what shows it, the best first.
+
+    `own_rate` [Hz] is that at which the reference was sampled.
+    """
     rate, one, two = record.sampling_rate_hz, record.reference[:, column], record.sensor[:, column]
-    yield _periods(one, used, recognise(one, rate).period_samples), "periods"
-    yield _at_rest(one, two, used, rate), "rest"
-    if _given(covariance_std) and not _untrusted(covariance_std, None, _SCATTERS * most):
-        yield covariance_std, "covariance"
-    yield _floor(one, two, rate, size), "floor"
+    if "reference" not in record.resampled:
+        # else a part of the noise is gone
+        for std, by in ((_periods(one, used, recognise(one, rate).period_samples), "periods"),
+                        (_at_rest(one, two, used, rate), "rest")):
+            if std is not None:
+                yield 2 * std**2 / rate, by
+    if _given(covariance_std):
+        yield 2 * covariance_std**2 / own_rate, "covariance"
+    density = _floor(one, two, record, size)
+    if density is not None:
+        yield density, "floor"
 
 
 def _at_rest(one, two, used, rate):
@@ -141,11 +168,12 @@ def _at_rest(one, two, used, rate):
     return float(np.sqrt(np.mean(parts[0][quiet]**2))) if shared < _SHARED**2 else None
 
 
-def _floor(one, two, rate, size):
-    """Standard deviation of white noise as large as an even density that the sensor lacks."""
+def _floor(one, two, record, size):
+    """An even density of the reference that the sensor lacks, or None."""
+    rate = record.sampling_rate_hz
     frequency, own = welch(one, rate, nperseg=size)
     other, shared = welch(two, rate, nperseg=size)[1], csd(one, two, rate, nperseg=size)[1]
-    inner = slice(2, -1)
+    inner = _inner(frequency, record)
     own, other, shared = own[inner], other[inner], shared[inner]
     # one that most segments do not have is that of a few spikes
     median = welch(one, rate, nperseg=size, average="median")[1][inner]
@@ -158,6 +186,6 @@ def _floor(one, two, rate, size):
     low, high = np.quantile(own[apart], (0.1, 0.9))
     density = np.median(own[apart])
     gain = np.median(np.abs(shared[together] / own[together]))
-    if high > _EVEN * low or np.median(other[apart]) * _SILENT > gain**2 * density:
+    if high > _EVEN * low or np.median(other[apart]) > _LOUDEST * gain**2 * density:
         return None
-    return float(np.sqrt(density * rate / 2))
+    return float(density)

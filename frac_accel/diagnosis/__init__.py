@@ -42,6 +42,8 @@ _EDGE = 4
 # what is left the right way round that may be left then, for the pair to count as exchanged.
 _ALIKE = 0.5
 _EXCHANGED = 0.3
+# Causes that are tried before a pair counts as exchanged.
+_TRIED = 4
 # Parameters of a classical core.
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
@@ -142,7 +144,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         candidates=[cause for cause, effect in known_effects().items()
                     if not effect.read_off and effect.acts_on(model.axis(axis).core)],
         stages=stages, step=found.step, limit=limit,
-        passed_on=None if noise and noise.bends else noise)
+        passed_on=None if noise and noise.bends else noise, loose=loose)
     engine, stray = _without_spikes(engine, used, stray, record.reference[:, column])
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
@@ -264,11 +266,21 @@ def _require_direction(engine, axis, start):
     reference, used = p.record.reference[:, p.axis], p.used
     swapped = AxisSimulator(p.measured, p.rate, p.record.temperature_c)
     backward = _shared(reference, swapped.simulate(p.baseline.axis(p.axis)), used)
-    if backward > _ALIKE and 1 - backward < _EXCHANGED * (1 - _shared(p.measured, start, used)):
+    if backward > _ALIKE and 1 - backward < _EXCHANGED * (1 - _shared(p.measured, start, used)) \
+            and _best_of_one(engine, p.measured, used) < backward:
         raise FracAccelError(
             f"axis {axis}: reference and sensor are exchanged: the reference follows the model's "
             f"answer to the sensor ({backward:.1%} of its power), and not the other way round; "
             "exchange the topics of --reference and --sensor")
+
+
+def _best_of_one(engine, measured, used):
+    """Share of the sensor's power that the model explains the right way round with one cause."""
+    search = engine.search
+    bare = search.fit(search.base)
+    fits = search.fit_all([search.begun(bare, cause, begin)
+                           for _, cause, begin in search.screen(bare)[:_TRIED]])
+    return max((_shared(measured, fit.output, used) for fit in fits), default=0.0)
 
 
 def _shared(one, other, used):

@@ -3,12 +3,14 @@
 import math
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
-from ..model import is_link
+from ..errors import FracAccelError
+from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.effects.base import CROSS_AXIS, OFFSET
-from .engine import WEIGHS
+from .engine import LONG, WEIGHS
 from .names import cancelling, undetermined
-from .problem import acts_on_spring
+from .problem import Problem, acts_on_spring
 from .words import AS_NOISE, is_accounted
 
 # Times the odd (even) part of what is left, in RMS, that an odd (even) cause must take.
@@ -25,12 +27,21 @@ _RESEMBLES = 30.0
 # Correlation from which a shift of the core does what a law of force does, and times what is left,
 # in RMS, that the law must then take to be told from others.
 _ALIKE, _TELLS_LAW = 0.8, 5.0
+# Parts of the record over whose length the mean shows what is slow, and share of what a cause
+# adds (RMS) from which it is slow.
+_SLOW_PARTS, _SLOW_SHARE = 20, 0.5
+# Share of what a cause takes (RMS) that it must change the output by: else its free motion does
+# that.
+_BY_ITSELF = 0.5
 # Filters that may be one of higher order: so many, or two with poles within such a factor.
 _SEVERAL, _NEAR = 3, 4.0
-# Distance of two filters' product from 1 below which they undo each other.
-_UNDOES = 0.03
+# Times the power that is left by a set with filters which a set without them, and without a link of
+# the model in use, may leave to say the same.
+_AS_WELL = 1.5
 # Standard uncertainties by which a delay below zero is one.
 _ACAUSAL = 3.0
+_MORE = ("a linear filter would take another {:.0%} of what is left: the linear causes only "
+         "imitate the true response")
 
 
 def doubts_about(engine, best, gains, stds, left, noise):
@@ -38,26 +49,33 @@ def doubts_about(engine, best, gains, stds, left, noise):
     p = engine.problem
     doubts = dict.fromkeys(engine.uncontested, "the time limit left no time for its rivals")
     doubts |= left_open(engine, best, stds, gains)
-    takes = {cause: float(np.sqrt(max(g.before**2 - g.after**2, 0.0)))
-             for cause, g in gains.items()}
+    takes = {cause: g.taken for cause, g in gains.items()}
     own, added = engine.by_reference(best), {cause: engine.added(best, cause) for cause in gains}
     for cause in gains:
         rms = min(takes[cause], engine.rms(added[cause]))
-        if rms < AS_NOISE * own:
+        if rms < _BY_ITSELF * takes[cause]:
+            doubts.setdefault(cause, f"it changes the output by {rms:.3g} RMS only: the rest of "
+                                     f"what it explains ({takes[cause]:.3g} RMS) is a free motion "
+                                     "of its own")
+        # noise makes nothing that changes with time
+        if rms < AS_NOISE * own and not best.effects[cause].shows_with_time:
             doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) is no more than what the "
                                      f"reference's own noise makes ({own:.3g} RMS)")
     if min(takes.values(), default=np.inf) < WEIGHS * left.rms:
         unexplained = engine.unexplained(best)
         for cause, rms in takes.items():
-            if rms < WEIGHS * unexplained:
+            like = best.effects[cause].kindred(best.residual, p.time)
+            strange = math.sqrt(max(unexplained**2 - like**2, 0.0))
+            if rms < WEIGHS * strange:
                 doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) does not stand out of "
-                                         f"what is left unexplained ({unexplained:.3g} RMS)")
+                                         f"what is left unexplained ({strange:.3g} RMS)")
     if noise.rms is None and left.rms > _MOST_OF * np.std(p.measured[p.used]):
         for cause in gains:
             doubts.setdefault(cause, f"{left.rms / np.std(p.measured[p.used]):.0%} of the output "
                                      "is left, and nothing shows that it is noise")
     for cause, words in {**by_what_is_left(engine, best, takes, left),
-                         **_acausal(engine, best, stds), **_of_the_model(engine, best)}.items():
+                         **_acausal(engine, best, stds), **_of_the_model(engine, best),
+                         **_as_slow(engine, best, added, takes)}.items():
         doubts.setdefault(cause, words)
     for pair in cancelling(added):
         for cause, other in (pair, pair[::-1]):
@@ -70,6 +88,20 @@ def doubts_about(engine, best, gains, stds, left, noise):
         for cause, words in engine.unstable(best).items():
             doubts.setdefault(cause, words)
     return {cause: words for cause, words in doubts.items() if cause in gains}
+
+
+def _as_slow(engine, best, added, takes):
+    """Slow causes beside which what is left wanders nearly as much: noise with a long memory."""
+    p, found = engine.problem, {}
+
+    def slow(values):
+        return engine.rms(uniform_filter1d(values, max(p.count // _SLOW_PARTS, 1)))
+    wanders = slow(best.residual)
+    for cause, change in added.items():
+        if takes[cause] < WEIGHS * wanders and slow(change) > _SLOW_SHARE * engine.rms(change):
+            found[cause] = f"what it explains is slow ({takes[cause]:.3g} RMS), and what is left " \
+                           f"wanders by {wanders:.3g} RMS"
+    return found
 
 
 def by_what_is_left(engine, fitted, takes, left):
@@ -120,8 +152,16 @@ def _imitators(engine, best, takes, left):
         return {}
     linear = [cause for cause, effect in best.effects.items()
               if cause in takes and (cause in filters or effect.is_constant)]
-    return dict.fromkeys(linear, f"a linear filter would take another {share:.0%} of what is left: "
-                                 "the linear causes only imitate the true response")
+    return dict.fromkeys(linear, _MORE.format(share))
+
+
+def resembles(engine, fitted, effect, taken):
+    """Why a delay or a shift of the core is not named that a filter would be better than, or ""."""
+    share = sum(share for share, part in engine.structure(fitted) if part == "linear")
+    if not (effect.pure_delay_s() or effect.restates_core) \
+            or taken > _RESEMBLES * math.sqrt(share) * engine.left(fitted).rms:
+        return ""
+    return _MORE.format(share)
 
 
 def _other_laws(engine, best, takes, left):
@@ -198,19 +238,34 @@ def _on_both_sides(engine, best):
 
 
 def _of_the_model(engine, best):
-    """Filters of the reference that undo one of the model in use: to be without that says the
-    same."""
-    p, found = engine.problem, {}
-    s = 2j * np.pi * np.linspace(0, p.rate / 2, 200)[1:]
-    own = [effect for effect in p.baseline.axis(p.axis).effects if is_link(effect)]
-    for cause, effect in _filters(engine, best).items():
-        if effect.of_reference and is_link(effect):
-            response = effect.transfer_function(s)
-            for link in own:
-                if np.max(np.abs(link.transfer_function(s) * response - 1)) < _UNDOES:
-                    found[cause] = (f"it undoes the {link.cause} of the model in use: the sensor "
-                                    "may only lack that")
-    return found
+    """Filters and delays without which, and without one link of the model in use, the sensor is
+    described as well: it may only lack that."""
+    p, filters = engine.problem, _filters(engine, best)
+    links = [effect for effect in p.baseline.axis(p.axis).effects
+             if is_link(effect) and effect.cause not in best.effects]
+    if not filters or not links:
+        return {}
+    rows = p.strongest(LONG // 2)
+    rest = {cause: effect for cause, effect in best.effects.items() if cause not in filters}
+    record, used = p.part(rows), p.used[rows]
+    power = Problem(record, p.axis, p.baseline, used, p.limit).fit(best.effects).cost
+    for link in links:
+        try:
+            without = Problem(record, p.axis, _without(p.baseline, p.axis, link), used, p.limit)
+            if without.fit(rest).cost < _AS_WELL * power:
+                return dict.fromkeys(filters, f"without the {link.cause} of the model in use the "
+                                              "record is described as well: the sensor may lack it")
+        except FracAccelError:
+            continue
+    return {}
+
+
+def _without(model, axis, link):
+    """A model without one link on an axis."""
+    axes = {name: model.axis(i) for i, name in enumerate(AXES)}
+    own = axes[AXES[axis]]
+    axes[AXES[axis]] = AxisModel(own.core, tuple(e for e in own.effects if e is not link))
+    return SensorModel(model.core, model.effects, axes, model.metadata, model.reference_faults)
 
 
 def _is_smooth(link):

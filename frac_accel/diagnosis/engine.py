@@ -41,13 +41,20 @@ _PARTS = 5
 _SLOW = 2
 # Variances of the noise within which two sets that say nearly the same count as equal.
 _CLOSE = 30.0
+# And by which another cause must be ahead to say more than a parameter of the model in use.
+_AHEAD = 10.0
 # Standard uncertainties, and share of its size, by which a parameter may differ between halves.
 _AGREE = 5.0
 _ALIKE = 0.1
+# Standard uncertainties within which a parameter is where the model in use has it.
+_UNMOVED = 3.0
 # Share of what is left that a part of the error budget must have, and at least may have, to be no
 # noise.
 _PART = 0.1
 _PART_AT_LEAST = 0.03
+# Share of bursts above which these are no heavy tails of noise (0.13 of Student's t with three
+# degrees of freedom).
+_TAILS = 0.3
 # Share of the residual's power for which a coarse lattice must account.
 _COARSE = 0.2
 # Frequencies over which a density is integrated.
@@ -81,7 +88,7 @@ class Engine:
     """
 
     def __init__(self, record, axis, baseline, used, base=None, candidates=(), stages=None,
-                 step=None, limit=None, passed_on=None):
+                 step=None, limit=None, passed_on=None, loose=None):
         slices = stretches_of(record, axis)
         self.problem = Stretches(record, axis, baseline, used, limit, slices) if slices[1:] else \
             Problem(record, axis, baseline, used, limit)
@@ -91,6 +98,8 @@ class Engine:
         # the record, and its samples that may count: of a very long one, more than are fitted
         self.record, self.wanted = record, used
         self.search = Search(self.problem, base, candidates, stages)
+        # `Open` by cause: what is known of the parameters that are free in every fit
+        self.loose = loose or {}
         # `ReferenceNoise` that is too little to bend a fit, and counts behind no filter; or None
         self.passed_on = passed_on
         # what counts in no fit, since a signal was at fault there
@@ -130,7 +139,7 @@ class Engine:
             rows = p.strongest(LONG // 2)
             self.part = Engine(p.part(rows), p.axis, p.baseline, p.taken(self.wanted)[rows],
                                self.search.base, self.search.candidates, self.search.stages,
-                               self._step, p.limit)
+                               self._step, p.limit, self.passed_on, self.loose)
             return self.part.run(seed)
         self.best = self.compete(self.search.run(self.threshold, self.promises, self.noise_only,
                                                  seed))
@@ -157,8 +166,13 @@ class Engine:
         """Cost with a penalty for each parameter, in units of the noise's variance."""
         return fitted.cost / variance + _CHANCE * fitted.size
 
-    def compete(self, best):
-        """Let every cause's nearest rivals take its place; the winner of all."""
+    def _evidence(self, fitted, variance):
+        """As `score`, by what was fitted only: that more kinds of a cause were tried makes another
+        one that fits worse no better."""
+        return fitted.cost / variance + _CHANCE * fitted.varied
+
+    def compete(self, best, unwanted=frozenset()):
+        """Let every cause's nearest rivals take its place; the winner of all without some."""
         for _ in range(4):
             unexplained = self.unexplained(best)
             for cause in best.effects:
@@ -176,7 +190,8 @@ class Engine:
                                     + [best.effects])
             variance = best.cost / self.problem.count
             near = sorted((fit for fit in self.search.fits.values()
-                           if len(fit.effects) <= len(best.effects)),
+                           if len(fit.effects) <= len(best.effects)
+                           and not fit.causes & unwanted),
                           key=lambda fit: self.score(fit, variance))
             winner = self._general(near, variance)
             if winner is best:
@@ -222,21 +237,54 @@ class Engine:
                  self.search.screen(rest)[:_RIVALS]
                  if cause not in unwanted and self.promises(rest, cost)]
         found = self.search.varied(next(iter(self.search.fit_all(begun)), rest))
+        if rest.cost - found.cost > self.threshold(found):
+            found = self.search.grow([self._own(found)], self.threshold, self.promises,
+                                     self.noise_only, len(unwanted) - 1)
+        else:
+            found = rest
         # what was found beside the unwanted has met its rivals beside them only
-        return self.compete(found if rest.cost - found.cost > self.threshold(found) else rest)
+        return self.compete(found, unwanted)
+
+    def _own(self, fitted):
+        return {cause: effect for cause, effect in fitted.effects.items()
+                if cause not in self.search.base}
 
     def rivals(self, best, cause):
         """Sets without a cause, no larger than the best, by score; (margin, causes)."""
         if self.part and cause in self.part.best.effects:
             return self.part.rivals(self.part.best, cause)
         variance = best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
-        own = self.score(best, variance)
-        found = [(self.score(fit, variance) - own, fit.causes) for fit in
+        own = self._evidence(best, variance)
+        found = [(self._evidence(fit, variance) - own, fit.causes) for fit in
                  self.search.fits.values()
                  if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
         # a hollow one that is close says the same in other words
         return [entry for entry in sorted(found, key=lambda entry: entry[0])
                 if entry[0] > _CLOSE or not self.hollow(self.search.fits[entry[1]])]
+
+    def instead_of_moved(self, fitted, own):
+        """A cause that says more than what the model in use leaves open does by moving, or None.
+
+        Parameters
+        ----------
+        fitted : Fitted
+        own : Effect
+            What the model in use says.
+        """
+        search, unmoved = self.search, {**fitted.effects, own.cause: own}
+        bare = self.problem.fit(unmoved, held=(own.cause,))
+        search.screens.pop(bare.causes, None)
+        found = search.screen(bare)[:_RIVALS]
+        trials = [(cause, search.begun(bare, cause, begin)) for _, cause, begin in found]
+        del search.screens[bare.causes]
+        limit = fitted.cost * (1 - _AHEAD / self.problem.count)
+        for cause, effects in trials:
+            try:
+                if self.problem.fit(effects, held=(own.cause,)).cost < limit:
+                    return cause
+            except FracAccelError:
+                continue
+        return None
 
     def uncertainties(self, fitted):
         """Standard uncertainties by cause and parameter, for any spectrum of the residual, and
@@ -261,7 +309,9 @@ class Engine:
         for unknown, std in zip(fitted.unknowns, stds):
             if unknown.jumps:
                 std = self.problem.jump_std(fitted, unknown, peak)
-            result.setdefault(unknown.cause, {})[unknown.name] = float(std)
+            by_stamps = fitted.effects[unknown.cause].std_by_stamps(self.record)
+            result.setdefault(unknown.cause, {})[unknown.name] = float(
+                np.hypot(std, by_stamps.get(unknown.name, 0.0)))
         return result
 
     @functools.cached_property
@@ -336,7 +386,8 @@ class Engine:
                   for entry in parts if entry["part"] != "noise"]
         return sorted(
             ((share, part) for share, low, part in shares
-             if share > _PART and low > _PART_AT_LEAST), reverse=True)
+             if share > (_TAILS if part == "bursts" else _PART) and low > _PART_AT_LEAST),
+            reverse=True)
 
     def unexplained(self, fitted):
         """RMS of what a fit leaves that is no noise, as far as it shows [output units]."""
@@ -349,11 +400,15 @@ class Engine:
         return float(np.sqrt(np.mean(values[self.problem.used]**2)))
 
     def learnt(self, fitted):
-        """The same causes, fitted to the learning part of the record only."""
+        """The same causes, fitted to the learning part of the record only, beside all that the
+        model in use leaves open as the whole record has it."""
         if fitted.causes not in self._learnt:
-            part = self.problem.restricted(self.problem.used & ~self.held_out_rows)
-            self._learnt[fitted.causes] = part.fit(fitted.effects, iterations=6)
+            self._learnt[fitted.causes] = self._learnt_of(fitted)
         return self._learnt[fitted.causes]
+
+    def _learnt_of(self, fitted):
+        part = self.problem.restricted(self.problem.used & ~self.held_out_rows)
+        return part.fit(fitted.effects, iterations=6, held=self.search.base)
 
     def predicts_better(self, fitted):
         """Whether a fit predicts the held-out part better than the model in use describes it."""
@@ -372,13 +427,29 @@ class Engine:
         On a coarse lattice the simulated values are put on it too: what rounding does to small
         signals is no other cause's merit.
         """
-        errors, step = [], self.coarse_step(best)
-        for fit in (self.search.without(best, cause), best):
-            output = self.learnt(fit).output
+        errors, step, less = [], self.coarse_step(best), self.search.without(best, cause)
+        known = self._unmoved(best)
+        if known:
+            less = self.problem.fit({**less.effects, **{name: best.effects[name]
+                                                        for name in known}}, held=known)
+        for fit in (less, best):
+            output = self._learnt_of(fit).output if fit is less and known \
+                else self.learnt(fit).output
             if step:
                 output = step * np.round(output / step)
             errors.append((self.problem.measured - output)[self.held_out_rows])
         return gain(*errors)
+
+    def _unmoved(self, best):
+        """Causes of the model in use that are free, but known, and where they are known to be: what
+        another cause says must not be put on them."""
+        known = {cause: entry for cause, entry in self.loose.items()
+                 if np.isfinite([*entry.std.values()]).all()}
+        stds = self.uncertainties(best) if known else {}
+        return [cause for cause, entry in known.items() if all(
+            abs(getattr(best.effects[cause], name) - getattr(entry.effect, name))
+            < _UNMOVED * np.hypot(std, stds[cause].get(name, 0.0))
+            for name, std in entry.std.items())]
 
     def unsteadiness(self, best, cause):
         """Largest deviation from 1 of a cause's strength in parts of the record.

@@ -34,6 +34,11 @@ class Gain:
         """Whether it matters, and is above zero for certain."""
         return self.reduction > _RELEVANT and self.ci95[0] > 0
 
+    @property
+    def taken(self):
+        """RMS of the error that is taken away [output units]."""
+        return float(np.sqrt(max(self.before**2 - self.after**2, 0.0)))
+
     def as_dict(self):
         """As the result file has it."""
         return {"held_out_rmse_before": self.before, "held_out_rmse_after": self.after,

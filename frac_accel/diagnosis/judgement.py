@@ -1,15 +1,15 @@
 """From fitted causes to a verdict: what is named, what is not, and why."""
 
 import dataclasses
-import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import expit
 
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel
 from ..model.effects import effect_of
-from .doubts import by_what_is_left, doubts_about, left_open
+from .doubts import by_what_is_left, doubts_about, left_open, resembles
 from .empirical import fit_empirical_link
 from .empirical_map import fit_empirical_map
 from .engine import WEIGHS
@@ -22,6 +22,8 @@ from .words import gain_words, is_accounted, reason_of, set_aside, verdict_of
 
 # Times that another set is looked for in which no cause is doubtful.
 _AGAIN = 2
+# Doubtful causes that are left out one after the other before another set is looked for.
+_WEAKEST = 2
 # Verdicts that leave something to be described.
 _INCOMPLETE = ("unexplained", "partly_explained")
 # Share of the baseline's excess power that may be left where causes are named.
@@ -30,6 +32,8 @@ _LEFT = 0.03
 _STEADY = 0.2
 # Margin, in variances of the noise, by which a cause must beat its nearest rival.
 _CLEAR = 10.0
+# Where nothing shows that what is left is noise, share of its power by which it must beat it.
+_NEARLY = 0.05
 # Standard uncertainties from the model's own value by which a parameter has moved.
 _MOVED = 5.0
 
@@ -67,6 +71,9 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
     best, gains, left, noise, stds, doubts = settled
     doubted |= more
     findings = []
+    p = engine.problem
+    clear = _CLEAR if is_accounted(engine.rms(best.residual), float(np.std(p.measured[p.used])),
+                                   noise) else max(_CLEAR, _NEARLY * p.count)
     suspects = [_suspect({cause}, 0.0, words) for cause, words in doubted.items()]
     for cause, g in gains.items():
         mirror = best.effects[cause].mirrors
@@ -80,7 +87,7 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
                         gain_words(cause, g, margin, instead), g)
         if cause in doubts:
             suspects.append(_suspect({cause}, 0.0, doubts[cause]))
-        elif margin > _CLEAR or (best.effects[cause].everyday and instead and not any(
+        elif margin > clear or (best.effects[cause].everyday and instead and not any(
                 effect_of(name).everyday for name in instead)):
             # of two that say the same, what is common
             findings.append(entry)
@@ -110,11 +117,15 @@ def _settled(engine, best, noise_std, known=None):
     known : dict of str to Gain, optional
         Causes that a part of the record has shown already, with their gains there.
     """
-    known, dropped = known or {}, {}
-    here = _examined(engine, best, noise_std, known)
+    known = known or {}
+    here, dropped = _without_the_weakest(engine, _examined(engine, best, noise_std, known),
+                                         noise_std, known)
     for _ in range(_AGAIN):
         # what cannot be named must not stand in the way of what can
         unwanted = {cause for cause in here.doubts if cause not in engine.uncontested}
+        # what is common may be in doubt only for its odd company
+        unwanted = {cause for cause in unwanted
+                    if not here.best.effects[cause].everyday} or unwanted
         if not unwanted:
             break
         there = _examined(engine, engine.instead(here.best, unwanted), noise_std, known)
@@ -123,6 +134,25 @@ def _settled(engine, best, noise_std, known=None):
         dropped.update({cause: here.doubts[cause] for cause in unwanted})
         here = there
     return here, dropped
+
+
+def _without_the_weakest(engine, here, noise_std, known):
+    """A set less its weakest doubtful causes, up to two, where nothing is doubtful then, and what
+    was dropped, in words; else the set as it is."""
+    there, dropped = here, {}
+    for _ in range(_WEAKEST):
+        # what comes into doubt only without another one stays
+        doubtful = (there.doubts.keys() & here.doubts.keys()) - engine.uncontested
+        if not doubtful or len(there.gains) < 2:
+            break
+        weakest = min(doubtful, key=lambda cause: there.gains[cause].taken)
+        dropped[weakest] = there.doubts[weakest]
+        there = _examined(engine, engine.search.without(there.best, weakest), noise_std, known)
+        # a smaller set does not understand more
+        if there.gains and not there.doubts and min(g.taken for g in there.gains.values()) \
+                > WEIGHS * engine.unexplained(here.best):
+            return there, dropped
+    return here, {}
 
 
 def _examined(engine, best, noise_std, known):
@@ -196,7 +226,12 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
                     if f.cause in fitted.effects else f for f in findings]
         fraction = remaining(fitted)
     # beside the model as it is in the end, not beside one with what is only suspected
-    findings = [*findings, *moved(fitted, stds), *shown_by(fitted)]
+    away, near = moved(fitted, stds)
+    suspects += [_suspect({cause}, 0.0, words) for cause, words in near.items()]
+    findings = [*findings, *away, *shown_by(fitted)]
+    if any(f.effect.goes_with_size for f in findings):
+        left = dataclasses.replace(left, level_score=0.0)
+        fraction = fraction if left.share > 0 else 0.0
     after = before if fitted.causes == baseline.causes else _rms(
         p.measured - engine.learnt(fitted).output, rest)
     # what the record shows by itself, such as scattered stamps, is no part of the model
@@ -219,7 +254,7 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
                          0.0 if plain else left.share, fraction, accounted, strange or faulty)
     effects = {**fitted.effects, **{f.cause: f.effect for f in findings}}
     described, after = _described(engine, fitted, after, {part for _, part in strange}) \
-        if verdict in _INCOMPLETE else ({}, after)
+        if verdict in _INCOMPLETE or strange else ({}, after)
     model = _extended(engine, {**effects, **{e.cause: e for e in described}})
     description = (f"; the extended model has {' and '.join(described.values())}, which describes "
                    "a part of it and names nothing") if described else ""
@@ -306,12 +341,13 @@ def _rms(error, rows):
 
 
 def _confidence(margin):
-    return float(1 / (1 + np.exp(-min(margin, 1400.0) / 2)))
+    return float(expit(margin / 2))
 
 
 def _moved(engine, best, loose, stds):
-    """Findings among the causes that were free: farther from the model than it allows for."""
-    findings = []
+    """Findings among the causes that were free: farther from the model than it allows for; and
+    those in doubt, with words."""
+    findings, doubtful = [], {}
     for cause, entry in loose.items():
         effect = best.effects[cause]
         farthest = max(abs(getattr(effect, name) - getattr(entry.effect, name))
@@ -323,9 +359,17 @@ def _moved(engine, best, loose, stds):
         error = (engine.problem.measured - best.output)[rows]
         held = engine.problem.simulate({**best.effects, cause: entry.effect})
         g = gain(error + (best.simulated - held)[rows], error)
-        taken = math.sqrt(max(g.before**2 - g.after**2, 0.0))
-        if g.is_relevant and taken >= WEIGHS * engine.unexplained(best):
+        if not g.is_relevant or g.taken < WEIGHS * engine.unexplained(best):
+            continue
+        words = resembles(engine, best, effect, g.taken)
+        other = None if words or not np.isfinite([*entry.std.values()]).all() else \
+            engine.instead_of_moved(best, entry.effect)
+        if other:
+            words = f"{other} explains more"
+        if words:
+            doubtful[cause] = words
+        else:
             findings.append(Finding(effect, stds[cause], _confidence(farthest**2), [], [
                 f"{farthest:.3g} standard uncertainties from the model's own value",
                 *gain_words(cause, g, np.inf, [])], g))
-    return findings
+    return findings, doubtful

@@ -140,12 +140,16 @@ class Fitted:
         return frozenset(self.effects)
 
     @property
+    def varied(self):
+        """Number of parameters that were fitted, with the constant and the drift that are free
+        where a filter of the reference has lost them."""
+        return len(self.unknowns) + sum(2 * bool(np.any(effect.poles() == 0))
+                                        for effect in self.effects.values())
+
+    @property
     def size(self):
-        """Number of parameters that were chosen: those fitted, the orders and kinds tried, and the
-        constant and the drift that are free where a filter of the reference has lost them."""
-        return len(self.unknowns) + sum(
-            len(fixed_values(effect)) + 2 * bool(np.any(effect.poles() == 0))
-            for effect in self.effects.values())
+        """Number of parameters that were chosen: also the orders and kinds tried."""
+        return self.varied + sum(len(fixed_values(effect)) for effect in self.effects.values())
 
     @functools.cached_property
     def jacobian(self):
@@ -382,7 +386,8 @@ class Problem:
         part.__dict__.update(self.__dict__, used=used, _columns={})
         return part
 
-    def fit(self, effects, iterations=_ITERATIONS, rough=False, hopeless=np.inf, goal=np.inf):
+    def fit(self, effects, iterations=_ITERATIONS, rough=False, hopeless=np.inf, goal=np.inf,
+            held=()):
         """Parameters of these causes that describe the record best, found from those given.
 
         Parameters
@@ -396,12 +401,14 @@ class Problem:
         goal : float
             Cost that a fit must come to at its pace, once it is finished, or it ends. Gains are
             taken to shrink evenly to nothing in the iterations to come.
+        held : collection of str
+            Causes whose parameters stay as they are.
 
         Returns
         -------
         Fitted
         """
-        unknowns = tuple(unknown for cause in effects
+        unknowns = tuple(unknown for cause in effects if cause not in held
                          for unknown in self.unknowns(effects[cause]))
         theta = np.array([_to_theta(getattr(effects[u.cause], u.name), u) for u in unknowns])
         inside = np.clip(theta, [u.low for u in unknowns], [u.high for u in unknowns])

@@ -10,6 +10,7 @@ from scipy.signal import resample_poly
 from ..model.effects import known_effects
 from .finding import Finding
 from .gain import gain
+from .leftover import rounding_errors
 from .words import gain_words
 
 # Samples of a stretch, and share of a record for which it must move, so that the size of what is
@@ -46,6 +47,11 @@ class Seen:
     used: np.ndarray
     is_coarse: bool
     parts: dict
+
+    def rounding(self):
+        """Errors, shape (n,), that a coarse lattice leaves of noisy simulated values."""
+        return next(rounding_errors((self.measured - self.output) * self.used, self.output,
+                                    self.used, self.found.step))
 
     def at_stamps(self):
         """Instants with a sample, and the simulated output at the stamps that these carry."""

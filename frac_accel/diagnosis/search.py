@@ -33,6 +33,12 @@ _AT_HAND = 8
 _AT_HAND_SAMPLES = 20_000
 # Samples by which causes are screened, where a record has more.
 _SCREENED = 6000
+# Share of the power of what a cause changes below which it is what the fit can do already.
+_NOTHING_NEW = 1e-6
+# Share of the largest gain that is expected in a round below which a cause is not tried.
+_LITTLE = 0.25
+# Variances of the noise within which orders and kinds of a cause say the same.
+_TIE = 10.0
 # Variances from the best fit of a round within which a fit must come if it goes on as it goes.
 _NEAR = 200.0
 
@@ -157,10 +163,17 @@ class Search:
                         others.append(self.problem.fit({**fit.effects, cause: other}))
                     except FracAccelError:
                         continue
-            better = min(others, key=lambda other: other.cost, default=fit)
-            if better.cost >= fit.cost:
+            close = min(other.cost for other in [fit, *others]) * (1 + _TIE / self.problem.count)
+            better = min((other for other in [fit, *others] if other.cost <= close),
+                         key=lambda other: (self._strayed(other), other.cost))
+            if better is fit:
                 return fit
             fit = better
+
+    def _strayed(self, fit):
+        """How far what the model in use leaves open has moved from what it says."""
+        return sum(abs(getattr(fit.effects[u.cause], u.name) - getattr(self.base[u.cause], u.name))
+                   / u.scale for u in fit.unknowns if u.cause in self.base)
 
     def _near(self, cost):
         return (1 + _NEAR / self.problem.count) * cost
@@ -169,8 +182,10 @@ class Search:
         p = self.problem
         model = p.axis_model(fitted.effects)
         celsius = p.record.temperature_c
+        delay = IDENTIFIED["delay_s"].cause
         return View(p.rate, p.time, p.measured, fitted.simulated, fitted.residual, p.used,
-                    model.effective_core, p.record.since_start_s, model.delay_s,
+                    model.effective_core, p.record.since_start_s,
+                    sum(e.delay_s for e in model.effects if e.cause == delay),
                     float(np.std(fitted.simulated[p.used])),
                     celsius is not None and np.ptp(celsius) > 0.1,
                     p.excited,
@@ -248,12 +263,14 @@ class Search:
                 return None
             change = change[rows]
             changes.append(change - known @ (known.T @ change))
+            if changes[-1] @ changes[-1] <= _NOTHING_NEW * (change @ change):
+                return None
         if len(changes) > 1:
             basis = _orthonormal(np.stack(changes, axis=1))
             explained = share * float(np.sum((basis.T @ residual)**2))
             return cost - explained, cause, start.effect
         size, shared = changes[0] @ changes[0], changes[0] @ residual
-        if not np.isfinite(size) or size <= 1e-24 * cost:
+        if not np.isfinite(size):
             return None
         factor = shared / size
         if start.kind in ("positive", "weak") and factor <= 0:
@@ -306,7 +323,7 @@ class Search:
                     if promises(parent, cost) and cost < least \
                             and (key not in wanted or cost < wanted[key][0]):
                         wanted[key] = cost, parent, cause, begin
-            chosen = sorted(wanted.values(), key=lambda entry: entry[0])[:_FITS]
+            chosen = _varied_choice(sorted(wanted.values(), key=lambda entry: entry[0]), best.cost)
             fits = self.fit_all([self.begun(*joins) for _, *joins in chosen])
             if not fits or best.cost - fits[0].cost < threshold(fits[0]):
                 break
@@ -351,6 +368,21 @@ class Search:
                 found = min((fit for fit in self.fits.values() if fit.causes <= frozenset(less)),
                             key=lambda fit: fit.cost)
         return found
+
+
+def _varied_choice(wanted, cost):
+    """The most promising of some (cost, set, cause, start) by cost: each cause beside its best set,
+    before any of them beside another one; none that promises little beside the best of them.
+
+    `cost` is that of the best set so far.
+    """
+    enough = cost - _LITTLE * max(cost - wanted[0][0], 0.0) if wanted else cost
+    seen, first, later = set(), [], []
+    for entry in wanted:
+        if entry[0] <= enough or wanted[0][0] >= cost:
+            (later if entry[2] in seen else first).append(entry)
+            seen.add(entry[2])
+    return [*first, *later][:_FITS]
 
 
 def _kinds(effects):

@@ -135,11 +135,23 @@ def typical_interval(stamps):
 
 
 def usable(samples):
-    """Mask of the samples whose stamps advance and whose values are finite."""
+    """Mask of the samples whose stamps advance and whose values are finite.
+
+    Where they come several at a time with one stamp, and other values, all of a batch.
+    """
     stamps = samples.stamps_ns
     good = np.isfinite(samples.values).all(axis=1)
-    good[1:] &= stamps[1:] > np.maximum.accumulate(stamps)[:-1]
-    return good
+    latest = np.maximum.accumulate(stamps)[:-1]
+    advances, repeats = good.copy(), good.copy()
+    advances[1:] &= stamps[1:] > latest
+    repeats[:1] = False
+    differs = np.any(samples.values[1:] != samples.values[:-1], axis=1)
+    repeats[1:] &= (stamps[1:] == latest) & differs
+    if np.sum(repeats) > _BATCHES * np.sum(good):
+        every = advances | repeats
+        if _batches((stamps[every] - stamps[0]) * 1e-9) is not None:
+            return every
+    return advances
 
 
 def merged(seconds, *columns):

@@ -111,14 +111,28 @@ class Record:
     def comparable(self, column, used):
         """The same with nothing on an axis that one of the two cannot show (`band_hz`).
 
-        `used` (n,) are the samples that count.
+        `used` (n,) are the samples that count; others are bridged.
         """
         if self.band_hz is None or not used.any():
             return self
-        reference, sensor = self.reference.copy(), self.sensor.copy()
-        for values, good in ((reference, self.valid), (sensor, used)):
-            values[:, column] = within(values[:, column], self.sampling_rate_hz, self.band_hz, good)
+        reference, sensor, missing = self.reference.copy(), self.sensor.copy(), ~self.valid
+        for values, wrong in ((reference, np.zeros(len(self), bool)),
+                              (sensor, self.valid & ~used)):
+            values[:, column] = within(values[:, column], self.sampling_rate_hz, self.band_hz,
+                                       wrong, missing)
         return dataclasses.replace(self, reference=reference, sensor=sensor)
+
+    @functools.cached_property
+    def rates_std_ppm(self):
+        """Standard uncertainty [1e-6] of the ratio of the topics' rates, where their instants come
+        from lines through stamps that scatter; 0 where they are counted."""
+        if not self.resampled or self.topics is None:
+            return 0.0
+        # of a fitted line's slope
+        slopes = [np.sqrt(12 / len(topic)) * topic.clock.scatter_s
+                  / max(1e-9 * float(topic.stamps_ns[-1] - topic.stamps_ns[0]), 1e-9)
+                  for topic in self.topics]
+        return float(1e6 * np.hypot(*slopes))
 
     @property
     def is_reference_late(self):

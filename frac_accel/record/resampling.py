@@ -19,6 +19,9 @@ REACH = int(np.ceil((_ATTENUATION_DB - 7.95) / (2.285 * 2 * np.pi * (_GONE - BAN
 # [periods of the band's edge].
 _INNER = 0.8
 _INNER_TAPS = (_ATTENUATION_DB - 7.95) / (2.285 * 2 * np.pi * (1 - _INNER)) / 2
+# Steps by which samples are bridged, and share of what they leave beyond the band (power) from
+# which there are no more.
+_STEPS, _BRIDGED = 12, 1e-6
 # Oversampling at which a spline of degree 5 is wrong by 1e-4 at the band's edge.
 _OVERSAMPLED = 2.2
 _DEGREE = 5
@@ -80,26 +83,57 @@ def band_limited(values, rate_hz, start_s, target_hz, target_start_s, count):
     return result
 
 
-def within(values, rate_hz, band_hz, good):
+def within(values, rate_hz, band_hz, wrong, missing):
     """Uniform samples without what is beyond a band, by a filter of linear phase without delay.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
     rate_hz, band_hz : float
-    good : ndarray of bool, shape (n,)
-        Samples that count; a straight line stands for the others.
+    wrong, missing : ndarray of bool, shape (n,)
+        Samples whose values are of no use, and those whose values are bridged already: both are
+        found anew, so that least of all is beyond the band.
 
     Returns
     -------
     ndarray, shape (n,)
     """
-    place = np.arange(len(values))
-    values = np.interp(place, place[good], values[good])
     half = min(int(np.ceil(_INNER_TAPS * rate_hz / band_hz)), len(values) - 1)
     taps = firwin(2 * half + 1, (1 + _INNER) / 2 * band_hz, window=("kaiser", _KAISER), fs=rate_hz)
-    longer = np.pad(values, half, mode="reflect", reflect_type="odd")
-    return oaconvolve(longer, taps, mode="valid")
+
+    def inside(values):
+        longer = np.pad(values, half, mode="reflect", reflect_type="odd")
+        return oaconvolve(longer, taps, mode="valid")
+    place = np.arange(len(values))
+    values = np.interp(place, place[~wrong], values[~wrong])
+    return inside(_bridged(values, wrong | missing, inside))
+
+
+def _bridged(values, missing, inside):
+    """Values, where some are missing changed so that least of all is beyond the band.
+
+    Least squares by conjugate gradients, of which there are few, as long gaps are not determined
+    (after A. Papoulis, *IEEE Trans. Circuits Syst.* 22 (1975) 735-742).
+    """
+    def beyond(values):
+        once = values - inside(values)
+        return (once - inside(once))[missing]
+    change, step = np.zeros(missing.sum()), -beyond(values)
+    residual, power = step, step @ step
+    enough = _BRIDGED * power
+    for _ in range(_STEPS):
+        if power <= enough:
+            break
+        full = np.zeros(len(values))
+        full[missing] = step
+        curved = beyond(full)
+        size = power / (step @ curved)
+        change, residual = change + size * step, residual - size * curved
+        power, before = residual @ residual, power
+        step = residual + power / before * step
+    values = values.copy()
+    values[missing] += change
+    return values
 
 
 def untouched(present, rate_hz, start_s, target_hz, target_start_s, count):

@@ -100,7 +100,8 @@ class Topic:
             finite = np.isfinite(samples.values).all(axis=1)
             self._useless = samples.stamps_ns[~finite]
             self.not_finite = len(self._useless)
-            self.duplicates = int(np.sum(np.diff(samples.stamps_ns[finite]) == 0))
+            self.duplicates = int(np.sum(np.diff(samples.stamps_ns[finite]) == 0)
+                                  - np.sum(np.diff(self.stamps_ns) == 0))
             self.stamps_back = max(len(good) - len(self) - self.duplicates - self.not_finite, 0)
         self._found = {}
 

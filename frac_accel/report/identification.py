@@ -205,8 +205,9 @@ def _residual_tests(section, tests):
             for name, statistic, freedom, p_value, good in (
                 ("residual is white", tests.whiteness_statistic, len(tests.lags),
                  tests.whiteness_p_value, tests.white),
-                ("residual does not depend on the reference", tests.independence_statistic,
-                 tests.independence_freedom, tests.independence_p_value, tests.independent))]
+                ("residual does not depend linearly on the reference",
+                 tests.independence_statistic, tests.independence_freedom,
+                 tests.independence_p_value, tests.independent))]
     section.table(["hypothesis", "chi-squared", "degrees of freedom", "p value", "at 1 %"], rows,
                   "Tests of the residual. Noise may be coloured; dependence on the reference means "
                   "that something is missing from the model.")

@@ -59,9 +59,12 @@ class Convolution:
 
     def response(self, transfer):
         """Responses of systems, shape (..., n), from their transfer functions (...) at `s`."""
+        if transfer.ndim > 1:
+            # one after the other: of a long record, all transforms at once take most memory
+            return np.stack([self.response(each) for each in transfer])
         spectrum = self._spectrum * transfer
-        self._smooth_at_nyquist(spectrum, transfer[..., -1:])
-        return irfft(spectrum, self._length)[..., :self._n] * self._undamped(1, self._n)
+        self._smooth_at_nyquist(spectrum, transfer[-1:])
+        return irfft(spectrum, self._length)[:self._n] * self._undamped(1, self._n)
 
     def response_between(self, transfer, factor, count):
         """Response at `factor` times the rate, shape (count,); `count` may exceed the input's end.

@@ -101,7 +101,7 @@ def test_a_complete_model_is_not_accused():
     rng = np.random.default_rng(20324)
     record = record_of(rng, duration_s=2.5, rng_noise=rng, snr_db=30.0, noise_ar=(0.9,))
     result = identify(pair_of(record), structure="oscillator")
-    assert "does not depend on the reference" in result.validation.verdict[0]
+    assert "does not depend linearly on the reference" in result.validation.verdict[0]
     assert "not white" in result.validation.verdict[0]
 
 

@@ -136,9 +136,23 @@ def test_right_stamps_of_uneven_instants_are_believed(seed):
     assert any("uneven" in words for words in record.topics[0].integrity(0).words)
 
 
+@pytest.mark.parametrize("sensor_hz", [195.0, 204.0])
+@pytest.mark.parametrize("seed", range(2))
+def test_what_is_near_a_gap_is_as_good_as_the_rest(seed, sensor_hz):
+    rng = np.random.default_rng(seed)
+    motion = multisine(rng, 60.0)
+    t, s = np.arange(12_000) / 200, np.arange(60 * sensor_hz) / sensor_hz
+    kept = rng.random(len(s)) > 0.02
+    record = Record.of(samples(t, motion(t)), samples(s[kept], motion(s[kept])))
+    one = record.comparable(0, record.valid)
+    error = (one.sensor - one.reference)[100:-100, 0][record.valid[100:-100]]
+    assert np.sqrt(np.mean(error**2)) < 0.005 * np.std(one.reference[:, 0])
+
+
+@pytest.mark.parametrize("apart_s", [2e-5, 0.0])
 @pytest.mark.parametrize("size", [2, 4, 10])
 @pytest.mark.parametrize("seed", range(2))
-def test_samples_in_batches_are_uniform(size, seed):
+def test_samples_in_batches_are_uniform(size, seed, apart_s):
     rng = np.random.default_rng([seed, size])
     motion, answer = multisine(rng, 8.0), multisine(rng, 8.0)
     t = np.arange(4000) / 100
@@ -146,7 +160,7 @@ def test_samples_in_batches_are_uniform(size, seed):
     sent = t[size - 1::size] + 1e-4 * rng.random(len(t[size - 1::size]))
     late = rng.random(len(sent)) < 0.03
     sent[late] += rng.uniform(0, 0.6 * size / 100, late.sum())
-    stamps = np.repeat(sent, size) + np.tile(np.arange(size) * 2e-5, len(sent))
+    stamps = np.repeat(sent, size) + np.tile(np.arange(size) * apart_s, len(sent))
     record = Record.of(samples(t, motion(t)), samples(stamps, answer(t[:len(stamps)])))
     assert record.topics[1].clock.kind == "batches"
     assert record.topics[1].clock.rate_hz == pytest.approx(100, rel=1e-5)

@@ -48,6 +48,8 @@ _TRIAL_ITERATIONS = 5
 # Share of the output's power, times the number of independent frequencies, that the best of all
 # resonances and delays still explains of an unrelated signal.
 _UNRELATED = 10
+# Share from which such a record may as well belong together.
+_SOME = 0.1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -395,6 +397,11 @@ class _Problem:
     def require_relation(self, state):
         explained = self.explained(state)
         if explained < 0.5 and explained < _UNRELATED / self.independent():
+            if explained > _SOME:
+                raise IdentificationError(
+                    f"the best model explains {explained:.0%} of the sensor's power only; the "
+                    "motion has so few independent frequencies that chance could do as much: "
+                    "whether both belong together is open; record longer, or with a wider band")
             raise IdentificationError(
                 "the sensor's output has nothing to do with the reference: the best model explains "
                 f"{max(explained, 0):.2%} of its power, which chance alone can do; were both "

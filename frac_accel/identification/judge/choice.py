@@ -11,6 +11,7 @@ from ..response.excitation import excited_band
 from ..response.frequency_response import linear_share
 from .candidate import Candidate, fit_of, fitted
 from .fit_validation import judge_residual
+from .notes import MOST_LEFT
 from .records import agreement, combine, freed, is_open
 
 # Share of an oscillator's held-out residual that a model which names no cause may leave.
@@ -131,6 +132,8 @@ def _preferred(classical, fractional, datas, judged):
         return classical, f"a fractional damping is not significant: {score}"
     if not fractional.held_out_nrmse < classical.held_out_nrmse:
         return classical, f"a fractional damping does not predict better: {held_out}"
+    if fractional.held_out_nrmse > MOST_LEFT:
+        return classical, f"a fractional damping leaves most of held-out data, too: {held_out}"
     if not _explains(classical, fractional, datas):
         return classical, ("a fractional damping does not explain what the classical model lacks: "
                            f"{held_out}")

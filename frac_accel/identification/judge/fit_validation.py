@@ -193,12 +193,12 @@ def _residual_words(tests, nrmse):
         return ["the residual depends on the reference "
                 f"({p_words(tests.independence_p_value)}): a better model could explain a further "
                 f"{tests.dependent_share * nrmse:.2%} of the output"]
-    words = ["the residual does not depend on the reference "
+    words = ["the residual does not depend linearly on the reference "
              f"({p_words(tests.independence_p_value)})"]
     if tests.white:
         return [f"{words[0]} and is white ({p_words(tests.whiteness_p_value)})"]
-    return [f"{words[0]}; it is noise with a spectrum of its own, not white "
-            f"({p_words(tests.whiteness_p_value)}), which the uncertainties allow for"]
+    return [f"{words[0]}; its spectrum is not white ({p_words(tests.whiteness_p_value)}), which "
+            "the uncertainties allow for"]
 
 
 def _band_words(bands):

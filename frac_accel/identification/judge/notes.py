@@ -7,6 +7,8 @@ from .open_parameters import open_combinations
 
 # A standard uncertainty above this share of its value: the data do not determine the parameter.
 _UNDETERMINED = 0.2
+# Held-out residual, of the output (RMS), above which little of the sensor is understood.
+MOST_LEFT = 0.5
 
 
 def candidate_notes(parameters, chosen, data, band_hz):
@@ -33,6 +35,9 @@ def candidate_notes(parameters, chosen, data, band_hz):
     if np.isfinite(held_out) and held_out > max(2 * nrmse, 1e-3):
         notes.append(f"held-out data are predicted worse ({held_out:.2%}) than the fitted "
                      f"({nrmse:.2%})")
+    if np.isfinite(held_out) and held_out > MOST_LEFT:
+        notes.append(f"the model misses {min(held_out, 1):.0%} of held-out data: something else "
+                     "acts, and no parameter is the sensor's with the uncertainty stated")
     return notes
 
 

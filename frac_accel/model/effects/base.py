@@ -102,6 +102,8 @@ class Effect:
     mirrors: ClassVar[str | None] = None
     # True for what a record shows by itself (`of_record`, `reading`), and no fit looks for
     read_off: ClassVar[bool] = False
+    # True for what leaves noise whose size follows the motion's
+    goes_with_size: ClassVar[bool] = False
     # True where one clock or one way to the stamps makes it the same for all axes
     common_to_axes: ClassVar[bool] = False
     # True for a link that is one number at all frequencies
@@ -216,6 +218,15 @@ class Effect:
     def degenerate(self):
         """Why, with these parameters, it is not what its name says, in words; or None."""
         return None
+
+    def kindred(self, residual, time_s):
+        """RMS [output units] of what is of its own kind in a residual, shape (n,), beside it: that
+        says nothing against it."""
+        return 0.0
+
+    def std_by_stamps(self, record):
+        """Standard uncertainties by parameter that a record's stamps leave, whatever is fitted."""
+        return {}
 
     def pure_delay_s(self):
         """Time [s] by which this effect moves the signal as it is."""

@@ -24,6 +24,9 @@ class ClockSkew(Effect):
     skew_ppm: float = parameter("1e-6", minimum=-10_000, maximum=10_000, scale=100.0,
                                 null=0.0)
 
+    def std_by_stamps(self, record):
+        return {"skew_ppm": record.rates_std_ppm}
+
     def clock_ratio(self):
         return 1 + 1e-6 * self.skew_ppm
 

@@ -5,6 +5,9 @@ import numpy as np
 _PASSES = 8
 # Errors larger than this many standard deviations count as that large.
 _OUTLIER = 5.0
+# Classes in which a law must hold, and how far the mean power of any may be from it: a share, and
+# standard errors.
+_CLASSES, _WITHIN, _ERRORS = 8, 0.2, 4.0
 
 
 def variance_law(error, square):
@@ -36,3 +39,18 @@ def likelihood(error, variance):
     """Logarithm of the likelihood of normal errors with these variances, up to a constant."""
     squares = np.minimum(error**2 / variance, _OUTLIER**2)
     return float(-0.5 * np.sum(squares + np.log(variance)))
+
+
+def follows(error, variance, measure):
+    """Whether a law of the variance holds in all classes of a measure, as many samples in each.
+
+    Parameters
+    ----------
+    error, variance, measure : ndarray, shape (n,)
+    """
+    ratios = np.minimum(error**2 / variance, _OUTLIER**2)
+    for rows in np.array_split(np.argsort(measure), _CLASSES):
+        off = abs(ratios[rows].mean() - 1)
+        if off > _WITHIN and off > _ERRORS * ratios[rows].std() / np.sqrt(len(rows)):
+            return False
+    return True

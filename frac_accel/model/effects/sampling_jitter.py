@@ -6,7 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import STAMPS, Effect, Reading
-from .residual_power import likelihood, variance_law
+from .residual_power import follows, likelihood, variance_law
 
 # Standard deviations by which the residual's power must follow the slope's, the logarithm of the
 # likelihood by which the slope must beat any other measure of the motion, and the share of the
@@ -28,6 +28,7 @@ class SamplingJitter(Effect):
 
     cause = "sampling_jitter"
     read_off = True
+    goes_with_size = True
     stage = STAMPS
     explanation = ("The instants of sampling scatter although the stamps do not: the error grows "
                    "with the slope of the signal.")
@@ -49,11 +50,17 @@ class SamplingJitter(Effect):
         squares = {name: np.square(values[used]) for name, values in measures.items()}
         fits = {name: variance_law(error, square) for name, square in squares.items()}
         noise, factor, std = fits["slope"]
+        if seen.is_coarse:
+            # what rounding makes of a small signal follows its slope as well
+            factor -= max(variance_law(seen.rounding()[used], squares["slope"])[1], 0.0)
         share = factor * squares["slope"].mean() / np.mean(error**2)
         own = likelihood(error, noise + factor * squares["slope"])
         if factor < _SIGNIFICANT * std or share < _SHARE or any(
                 own - likelihood(error, fits[name][0] + fits[name][1] * squares[name]) < _BETTER
                 for name in ("level", "bend")):
+            return None
+        if not all(follows(error, noise + factor * squares["slope"], squares[name])
+                   for name in ("slope", "level")):
             return None
         shift = error * slope[used] / (noise + factor * squares["slope"])
         if any(abs(np.corrcoef(shift[lag:], shift[:-lag])[0, 1]) > _INDEPENDENT

@@ -30,7 +30,9 @@ class TimeDelay(Effect):
     @classmethod
     def left_open(cls, axis_model, stds, stamps_std_s):
         std = float(np.hypot(stds.get("delay_s", 0.0), stamps_std_s))
-        return Open(cls(axis_model.delay_s), {"delay_s": std}) if std else None
+        # a filter's own delay is no part of it
+        own = next((effect for effect in axis_model.effects if isinstance(effect, cls)), cls(0.0))
+        return Open(own, {"delay_s": std}) if std else None
 
     def pure_delay_s(self):
         return self.delay_s

@@ -10,6 +10,8 @@ from .fit_starts import finite, strongest_line
 
 # A tone that wanders by less than about a third of this share of its frequency is followed.
 _RELATIVE_WIDTH = 3e-4
+# The highest harmonic that is taken for a part of the tone.
+_HARMONICS = 10
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,6 +44,13 @@ class ToneInterference(Effect):
     def live(self, sampling_rate_hz):
         """In a stream the phase is not known: it is found."""
         return _Tracker(self, sampling_rate_hz)
+
+    def kindred(self, residual, time_s):
+        # harmonics
+        turns = 2j * np.pi * self.frequency_hz * time_s
+        lines = [np.mean(residual * np.exp(-number * turns))
+                 for number in range(2, _HARMONICS + 1)]
+        return float(np.sqrt(2) * np.linalg.norm(lines))
 
     def _tone(self, circumstances):
         phase = 2 * np.pi * self.frequency_hz * circumstances.time_s + self.phase_rad

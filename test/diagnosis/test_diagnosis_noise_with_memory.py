@@ -1,0 +1,65 @@
+"""Noise and hum as instruments have them: no false name, and the true one."""
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfilt
+
+import frac_accel
+from frac_accel.model.core import Gain
+
+RATE = 200.0
+
+
+def diagnosed(motion, sensor):
+    return frac_accel.diagnose((motion, sensor), frac_accel.SensorModel(Gain(1.0)),
+                               sampling_rate_hz=RATE)
+
+
+def band(rng, count, low_hz, high_hz):
+    sos = butter(4, (low_hz, high_hz), "bandpass", fs=RATE, output="sos")
+    return sosfilt(sos, rng.standard_normal(count + 1000))[1000:]
+
+
+@pytest.mark.parametrize("seed", [4101, 4102, 4103])
+def test_a_high_pass_gets_no_credit_for_a_decay_that_follows_a_wandering_zero(seed):
+    rng = np.random.default_rng(seed)
+    motion = band(rng, 8000, 5.0, 60.0)
+    walk = np.cumsum(rng.standard_normal(len(motion)))
+    sensor = motion + 0.1 * walk / np.std(walk) + 1e-3 * rng.standard_normal(len(motion))
+    assert not {f.cause for f in diagnosed(motion, sensor).findings} & {
+        "ac_coupling", "reference_ac_coupling"}
+
+
+@pytest.mark.parametrize("seed", [4111, 4112, 4113])
+def test_slow_noise_makes_no_step_of_static_levels(seed):
+    rng = np.random.default_rng(seed)
+    levels = np.r_[0:101:20, 80:-1:-20]
+    motion = np.repeat(levels, 600).astype(float) + 1e-3 * rng.standard_normal(600 * len(levels))
+    spectrum = np.fft.rfft(rng.standard_normal(len(motion)))
+    spectrum[1:] /= np.sqrt(np.arange(1, len(spectrum)))
+    pink = np.fft.irfft(spectrum, len(motion))
+    sensor = rng.uniform(1.01, 1.03) * motion + 0.35 + 0.02 * pink / np.std(pink)
+    assert not {f.cause for f in diagnosed(motion, sensor).findings} - {
+        "sensitivity_error", "offset"}
+
+
+@pytest.mark.parametrize("seed", [4121, 4122, 4123])
+def test_the_harmonics_of_a_hum_say_nothing_against_it(seed):
+    rng = np.random.default_rng(seed)
+    motion, time = band(rng, 8000, 2.0, 40.0), np.arange(8000) / RATE
+    hum_hz = rng.uniform(16, 19)
+    hum = sum(size * np.sin(2 * np.pi * number * hum_hz * time + rng.uniform(0, 2 * np.pi))
+              for number, size in ((1, 1.0), (2, 0.35), (3, 0.2), (4, 0.1)))
+    sensor = motion + 0.1 * hum + 1e-3 * rng.standard_normal(len(time))
+    found = {f.cause: f.effect for f in diagnosed(motion, sensor).findings}
+    assert found.keys() == {"tone_interference"}
+    assert np.isclose(found["tone_interference"].frequency_hz, hum_hz, rtol=1e-4)
+
+
+@pytest.mark.parametrize("seed", [4131, 4132, 4133])
+def test_a_rattle_above_a_level_is_no_scatter_of_the_instants(seed):
+    rng = np.random.default_rng(seed)
+    motion = band(rng, 8000, 2.0, 40.0) * np.linspace(0.3, 1.5, 8000)
+    loud = np.abs(motion) > rng.uniform(1.5, 2.0) * np.std(motion)
+    sensor = motion + np.std(motion) * (0.03 * loud + 1e-3) * rng.standard_normal(len(motion))
+    assert "sampling_jitter" not in {f.cause for f in diagnosed(motion, sensor).findings}

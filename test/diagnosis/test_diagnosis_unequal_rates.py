@@ -1,0 +1,47 @@
+"""Drives of the rig with unequal rates, losses, scattering stamps and a noisy reference."""
+
+import pytest
+from blind.plan import GROUPS, plan
+
+import frac_accel
+
+TRIALS = {trial.name: trial for trial in plan(62, GROUPS)}
+# What is hidden, and what is named besides since it is there, too.
+EXACT = {
+    "road_single/reference_noise/0": {"reference_noise"},
+    "road_single/cross_axis_sensitivity/0": {"cross_axis_sensitivity", "reference_noise"},
+    "road_single/second_resonance/0": {"second_resonance", "quantization", "reference_noise"},
+    "road_single/reference_low_pass/0": {"reference_low_pass", "clock_skew"},
+    "road_single/linear_phase_filter/0": {
+        "linear_phase_filter", "dropped_samples", "quantization", "timestamp_jitter"},
+    "road_single/ac_coupling/1": {
+        "ac_coupling", "clock_skew", "dropped_samples", "reference_noise", "timestamp_jitter"},
+    "road_single/dead_zone/0": {"dead_zone", "quantization"},
+}
+
+
+def diagnosed(name):
+    case = TRIALS[name].case()
+    reference, sensor, temperature = case.samples()
+    return case, frac_accel.diagnose((reference, sensor), case.model(), temperature=temperature)
+
+
+@pytest.mark.parametrize("name, causes", EXACT.items())
+def test_what_is_hidden_is_named_and_nothing_else(name, causes):
+    case, found = diagnosed(name)
+    assert (found.verdict, {f.cause for f in found.findings}) == ("explained", causes)
+    true = {**case.truth, **case.besides}
+    for finding in found.findings:
+        for parameter, value in true[finding.cause].items():
+            if isinstance(value, float) and finding.std.get(parameter):
+                near = max(4 * finding.std[parameter], 0.02 * abs(value))
+                if parameter in ("fraction", "rms_s"):  # of the drawn ones
+                    near = 0.1 * value
+                assert abs(getattr(finding.effect, parameter) - value) < near, parameter
+
+
+@pytest.mark.parametrize("name", ["road_outside/wrong_model/0", "road_single/low_pass_filter/0"])
+def test_a_filter_that_the_record_does_not_tell_from_others_has_no_name(name):
+    # the model in use has a low-pass too many; a low-pass that is much like a moving average there
+    _, found = diagnosed(name)
+    assert not found.findings and found.suspects
