@@ -84,8 +84,8 @@ bench-fleet: setup
 ifdef BENCH_FLEET
 	PYTHONPATH=test:. $(python) -m $(BENCH_FLEET)
 else
-	for part in "fleet_bench workers" "fleet_bench pooling" "monitoring_bench drives" \
-	    "monitoring_bench healthy"; do PYTHONPATH=test:. $(python) -m $$part || exit; done
+	for part in "fleet_bench workers" "fleet_bench restart" "fleet_bench pooling" \
+	    "monitoring_bench drives" "monitoring_bench healthy"; do PYTHONPATH=test:. $(python) -m $$part || exit; done
 endif
 
 # MINUTES=2 for a shorter one; SOAK="--rate 2000 --restart 8" with publishers that come and go.

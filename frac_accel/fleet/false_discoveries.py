@@ -2,6 +2,9 @@
 
 import numpy as np
 
+# Largest share of false ones among what is discovered.
+FALSE_DISCOVERY_RATE = 0.01
+
 
 def discoveries(p_values, rate, dependent=True):
     """Hypotheses to reject.

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from .pooled import FEWEST
-
+# Fewest vehicles whose estimates are pooled, and that make a group.
+FEWEST = 8
 # Words of a column beyond which its values are names, not kinds.
 _MOST_KINDS = 50
 # Parts into which a column of numbers is cut.

@@ -5,9 +5,11 @@ import dataclasses
 
 import numpy as np
 
+from .estimates import Estimates
 from .groups import groups_of
+from .peers import common_causes, odd_vehicles
 from .plan import VEHICLE
-from .pooled import Estimates, common_causes, odd_vehicles, weak_effects
+from .weak_effects import weak_effects
 
 # Most bags that are listed one by one.
 _MOST_LISTED = 500
@@ -73,7 +75,7 @@ def weak_words(effect):
     """A weak effect in a line."""
     p = effect.pooled
     name = f"{effect.cause} {effect.parameter}".strip()
-    rivals = f"; as well {', '.join(effect.confusable_with)}" if effect.confusable_with else ""
+    rivals = f"; {effect.rivals}" if effect.rivals else ""
     return (f"{effect.group}: {name} {p.mean:.4g} {_unit(effect.unit)}({p.low:.4g} to {p.high:.4g},"
             f" spread {p.spread:.2g}, {p.count} vehicles, p = {p.p_value:.1g}){rivals}")
 

@@ -37,7 +37,7 @@ class Pooled(NamedTuple):
     count: int
 
 
-def pool(values, stds):
+def pool(values, stds, freedom=0):
     r"""Hierarchical mean :math:`\mu` of :math:`y_i \sim N(\mu, s_i^2 + \tau^2)`.
 
     The spread is that of Paule and Mandel, for which the weighted squares have their expected
@@ -49,6 +49,9 @@ def pool(values, stds):
     ----------
     values, stds : ndarray, shape (n,)
         At least two; standard uncertainties above 0.
+    freedom : float
+        Degrees of freedom by which it is known from elsewhere that, where there is no effect,
+        estimates scatter no more than `stds` say; it counts for the test alone.
 
     Returns
     -------
@@ -62,7 +65,7 @@ def pool(values, stds):
     factor = max(weight @ (values - mean)**2 / (count - 1), 1.0)
     std = np.sqrt(factor / weight.sum())
     reach = stdtrit(count - 1, (1 + _COVERAGE) / 2) * std
-    p_value = 2 * stdtr(count - 1, -abs(mean) / std)
+    p_value = 2 * stdtr(max(count - 1, freedom), -abs(mean) / std)
     return Pooled(float(mean), float(std), float(mean - reach), float(mean + reach), float(spread),
                   float(p_value), count)
 

@@ -20,6 +20,8 @@ from ..errors import FracAccelError
 
 # Times that a task may end its worker before it is given up.
 _DEATHS = 3
+# Processes that are started for it at most, whether they came as far as to begin with it or not.
+_STARTS = 6
 # Tasks for each worker that are on their way.
 _AHEAD = 3
 # Longest time [s] to wait for a cluster, at the start and when it is lost.
@@ -92,16 +94,21 @@ class LocalCores:
 
     def _one_by_one(self, function, tasks):
         """Those of some tasks that one process lives through, and one that has ended several."""
-        deaths = 0
-        while tasks and deaths < _DEATHS:
+        deaths = starts = 0
+        while tasks and deaths < _DEATHS and starts < _STARTS:
+            starts += 1
             with self._pool(1) as pool:
+                has_begun = False
                 try:
+                    # no task is to blame for a process that dies while it starts
+                    _result(pool.submit(package_version))
+                    has_begun = True
                     while tasks:
                         result = _result(pool.submit(function, tasks[0]))
                         yield tasks.popleft(), result
-                        deaths = 0
+                        deaths = starts = 0
                 except BrokenProcessPool:
-                    deaths += 1
+                    deaths += has_begun
         if tasks:
             yield tasks.popleft(), None
 

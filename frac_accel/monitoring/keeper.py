@@ -8,6 +8,7 @@ from ..errors import FracAccelError
 from ..model import SensorModel
 from .errand import Errand
 from .journal import Journal
+from .mutual import NOBODY, REFERENCE, SENSOR, UNKNOWN, Mutual
 from .trial import Trial
 from .watch import ENOUGH_S, Watch
 
@@ -36,6 +37,9 @@ class Keeper:
     give : callable
         Called with a model file that the corrector is to use; returns once that has been asked
         for. The answer comes by `given`.
+    mutual : bool
+        Whether the reference may have changed as well as the sensor: nothing is diagnosed then
+        until a third sensor has shown that it is the sensor.
 
     Attributes
     ----------
@@ -43,12 +47,14 @@ class Keeper:
     latest : dict
         Result of the last diagnosis; empty before one.
     trial : Trial or None
+    blamed : str
+        Who has changed, by `Mutual.changed`.
     state : str
         learning, watching, changed (waiting for motion), diagnosing or trying.
     """
 
     def __init__(self, model_file, folder, axis, apply, give, *, limit_mb=500.0, budget=0.05,
-                 time_limit_s=60.0, niceness=19, every_s=0.0, false_alarm_h=1000.0):
+                 time_limit_s=60.0, niceness=19, every_s=0.0, false_alarm_h=1000.0, mutual=False):
         if apply not in APPLY:
             raise FracAccelError(f"apply: {apply!r} given, expected {' or '.join(APPLY)}")
         self._axis, self._apply, self._give = axis, apply, give
@@ -57,6 +63,8 @@ class Keeper:
         self.journal = Journal(folder, limit_mb)
         self.model_file = str(Path(model_file).resolve())
         self.watch = Watch(SensorModel.load(model_file), axis, false_alarm_h)
+        self._mutual = Mutual(self.watch.model, axis, false_alarm_h) if mutual else None
+        self.blamed = NOBODY
         self.latest, self.trial, self.notes = {}, None, []
         self._errand = self._candidate = self._asked = None
         self._reason, self._last_s = "", time.monotonic()
@@ -74,8 +82,8 @@ class Keeper:
             return "changed"
         return "learning" if self.watch.learning else "watching"
 
-    def add(self, reference, sensor):
-        """Take in samples of both topics, either of which may be None."""
+    def add(self, reference, sensor, third=None):
+        """Take in samples of the topics, any of which may be None."""
         for window in self.watch.add(reference, sensor):
             if self.trial is not None and self.trial.verdict == "open":
                 self._compare(window)
@@ -84,6 +92,17 @@ class Keeper:
             change = self.watch.changed
             self._note("changed", onset_ns=change.ns, interval_ns=[change.low_ns, change.high_ns],
                        gradual=change.is_gradual)
+        self._blame(reference, sensor, third)
+
+    def _blame(self, *samples):
+        """Say who has changed, each time that it is somebody else."""
+        blamed = SENSOR if self.watch.changed is not None else NOBODY
+        if self._mutual is not None:
+            self._mutual.add(*samples)
+            blamed = self._mutual.changed(self.watch.changed is not None)
+        if self._mutual is not None and blamed != self.blamed:
+            self._note("blamed", who=blamed)
+        self.blamed = blamed
 
     def turn(self):
         """Go on with what is going on; several times a second."""
@@ -93,7 +112,7 @@ class Keeper:
                 self._finish(result)
             return
         waits = self.trial is not None and self.trial.verdict == "open"
-        if self.watch.changed is not None and not self._is_examined and not waits \
+        if self.blamed == SENSOR and not self._is_examined and not waits \
                 and self.watch.excited_since_s() >= ENOUGH_S:
             self._is_examined = True
             self.diagnose("a change")
@@ -104,6 +123,8 @@ class Keeper:
         """Begin a diagnosis; why none is begun, or an empty text."""
         if self._errand is not None:
             return "a diagnosis is under way"
+        if self.blamed in (REFERENCE, UNKNOWN):
+            return f"the sensor may be as it was: of three, {self.blamed} has changed"
         pair = self.watch.to_diagnose()
         if pair is None:
             return "there is no well excited stretch yet"
@@ -143,6 +164,8 @@ class Keeper:
         self.model_file, self._candidate, self.trial = model_file, None, None
         self.latest, self._is_told, self._is_examined = {}, False, False
         self.watch.use(SensorModel.load(model_file))
+        if self._mutual is not None:
+            self._mutual.use(self.watch.model)
 
     def end(self):
         """Leave nothing running."""

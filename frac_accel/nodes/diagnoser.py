@@ -12,6 +12,7 @@ from frac_accel.errors import FracAccelError
 from frac_accel.io import cdr
 from frac_accel.model import AXES, SensorModel
 from frac_accel.monitoring.keeper import APPLY, Keeper
+from frac_accel.monitoring.mutual import NOBODY, SENSOR
 from frac_accel.monitoring.observations import Observer
 from frac_accel.monitoring.watch import WINDOW_S
 from frac_accel.nodes._errors import NodeError
@@ -59,7 +60,10 @@ class Diagnoser(FracAccelNode):
                 maximum=1e7),
             "false_alarm_h": self.declare(
                 "false_alarm_h", 1000.0, "mean time between false alarms [h]", minimum=0.01,
-                maximum=1e6)}
+                maximum=1e6),
+            "mutual": self.declare(
+                "mutual", False, "whether the reference is no better than the sensor: who has "
+                                 "changed is said once imu/third agrees with one of them")}
         if not model_file:
             raise NodeError("parameter 'model_file' is missing: -p model_file:=SENSOR.yaml")
         if axis not in tuple(AXES):
@@ -72,10 +76,11 @@ class Diagnoser(FracAccelNode):
         self._alone, self._alone_from_s, self._observations = [], time.monotonic(), []
         self._reference_s = None
         message_class = import_message_class(self._type)
+        topics = {"imu/reference": self._on_reference, "imu/data_raw": self._on_raw,
+                  **({"imu/third": self._on_third} if wishes["mutual"] else {})}
         self._subscriptions_ = [
             RawSubscription(self, message_class, topic, take, raw_qos(depth), is_direct=True)
-            for topic, take in (("imu/reference", self._on_reference),
-                                ("imu/data_raw", self._on_raw))]
+            for topic, take in topics.items()]
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._result = self.create_publisher(DiagnosticArray, "~/result", 10)
         self._client = self.create_client(SetParameters, f"{self._corrector}/set_parameters")
@@ -100,19 +105,18 @@ class Diagnoser(FracAccelNode):
 
     def _on_reference(self, batch):
         self._reference_s = time.monotonic()
-        self._take(batch, True)
+        samples = self._read(batch)
+        if samples is not None:
+            self._keeper.add(samples, None)
+
+    def _on_third(self, batch):
+        samples = self._read(batch)
+        if samples is not None:
+            self._keeper.add(None, None, samples)
 
     def _on_raw(self, batch):
-        self._take(batch, False)
-
-    def _take(self, batch, is_reference):
-        try:
-            samples = cdr.read_samples(self._type, [message.data for message in batch])
-        except FracAccelError as error:
-            self.get_logger().warning(f"{error}", throttle_duration_sec=10.0)
-            return
-        if is_reference:
-            self._keeper.add(samples, None)
+        samples = self._read(batch)
+        if samples is None:
             return
         silent = self._reference_s is None \
             or time.monotonic() - self._reference_s > _ALONE_S
@@ -120,6 +124,14 @@ class Diagnoser(FracAccelNode):
             self._look_alone(samples)
         else:
             self._keeper.add(None, samples)
+
+    def _read(self, batch):
+        """Samples of messages; None where they cannot be read."""
+        try:
+            return cdr.read_samples(self._type, [message.data for message in batch])
+        except FracAccelError as error:
+            self.get_logger().warning(f"{error}", throttle_duration_sec=10.0)
+            return None
 
     def _look_alone(self, samples):
         """Without a reference: observations of windows of the sensor alone."""
@@ -149,6 +161,10 @@ class Diagnoser(FracAccelNode):
         keeper = self._keeper
         if keeper.latest:
             status = self._of_result(keeper.latest)
+        elif keeper.blamed not in (NOBODY, SENSOR):
+            status = DiagnosticStatus(level=_WARN, message="sensor and reference no longer agree; "
+                                      f"of sensor, reference and third, {keeper.blamed} has "
+                                      "changed")
         elif keeper.watch.changed is not None:
             status = DiagnosticStatus(level=_WARN, message="the sensor has changed; a diagnosis "
                                       "waits for motion, or is under way")

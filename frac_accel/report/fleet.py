@@ -8,8 +8,8 @@ from .page import Page
 _SHOWN = 500
 _FALSE_DISCOVERIES = (
     "Each cause is tested in each group that the given columns make. Of all that is shown here, at "
-    "most one per cent is expected to be chance (Benjamini and Yekutieli). Effects are to first "
-    "order beside the model in use; where another cause would say the same, it is listed.")
+    "most one per cent is expected to be wrong (Benjamini and Yekutieli). Effects are to first "
+    "order beside the model in use; all other causes that may be behind them are listed.")
 
 
 def fleet_page(seen, command=""):
@@ -60,10 +60,10 @@ def _together(page, seen):
     if seen.weak:
         section.table(
             ["group", "cause", "parameter", "mean", "95 % interval", "spread", "unit", "vehicles",
-             "p", "would say the same"],
+             "p", "may also be behind it"],
             [[e.group, e.cause, e.parameter, f"{e.pooled.mean:.4g}",
               f"{e.pooled.low:.4g} to {e.pooled.high:.4g}", f"{e.pooled.spread:.2g}", e.unit,
-              e.pooled.count, f"{e.pooled.p_value:.1g}", ", ".join(e.confusable_with) or "–"]
+              e.pooled.count, f"{e.pooled.p_value:.1g}", e.rivals or "–"]
              for e in seen.weak],
             "Mean over vehicles of what each cause would be on its own, to first order.")
     if seen.odd:

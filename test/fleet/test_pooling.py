@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 from scipy.stats import false_discovery_control
 
+from frac_accel.fleet.estimates import Estimates
 from frac_accel.fleet.false_discoveries import discoveries
 from frac_accel.fleet.groups import ALL, groups_of
-from frac_accel.fleet.pooled import Estimates, common_causes, odd_vehicles, weak_effects
+from frac_accel.fleet.peers import common_causes, odd_vehicles
 from frac_accel.fleet.random_effects import pool
+from frac_accel.fleet.weak_effects import weak_effects
 from frac_accel.model import SensorModel
 
 VEHICLES, WEAK = 70, 30
@@ -119,6 +121,76 @@ def test_a_vehicle_that_differs_from_its_peers_is_named(fleet):
     odd = odd_vehicles(rest, [f"car {i}" for i in range(VEHICLES)])
     assert [entry["vehicle"] for entry in odd] == ["car 5"]
     assert abs(odd[0]["deviations"]) > 6
+
+
+def screened_of(columns, residual, std=1.0):
+    """As `Screen` tells it, of columns for causes a, b, c, ..."""
+    size = np.linalg.norm(columns, axis=0)
+    cosines = (columns / size).T @ (columns / size)
+    return {"estimates": [
+        {"cause": name, "parameter": "", "unit": "1", "value": float(column @ residual / own**2),
+         "std": float(std / own), "size": float(own / np.sqrt(len(column)))}
+        for name, column, own in zip("abcdef", columns.T, size)],
+        "correlations": cosines[np.triu_indices(len(size), 1)].tolist()}
+
+
+def alike(rng, count=5, samples=80):
+    """Columns of which the first ones look alike, as those of a delay and a filter do."""
+    columns = rng.normal(size=(samples, count))
+    columns[:, 1] = columns[:, 0] + 0.3 * columns[:, 1]
+    columns[:, 2] = columns[:, 0] - columns[:, 1] * 0.5 + 0.5 * columns[:, 2]
+    return columns * rng.uniform(0.3, 3.0, count)
+
+
+def test_beside_other_causes_an_estimate_is_that_of_a_joint_fit():
+    rng = np.random.default_rng(12)
+    columns, residual = alike(rng), rng.normal(size=80)
+    columns[:, 4] = columns[:, 0] * 3 + 1e-3 * columns[:, 4]
+    rest = Estimates.of([screened_of(columns, residual)]).beside(np.ones(1, bool), [0, 2])
+    for cause in (1, 3):
+        own = columns[:, [cause, 0, 2]]
+        assert rest.values[0, cause] == pytest.approx(np.linalg.lstsq(own, residual)[0][0])
+        assert rest.stds[0, cause] == pytest.approx(np.sqrt(np.linalg.inv(own.T @ own)[0, 0]))
+    assert np.isnan(rest.values[0, [0, 2, 4]]).all()  # themselves, and one that is the same
+    left = [np.ones(1)] * 5
+    for cause in (1, 3):
+        left[cause] = columns[:, cause] - columns[:, [0, 2]] @ np.linalg.lstsq(
+            columns[:, [0, 2]], columns[:, cause])[0]
+    assert rest.correlations[0, 1, 3] == pytest.approx(
+        left[1] @ left[3] / np.linalg.norm(left[1]) / np.linalg.norm(left[3]), abs=1e-5)
+
+
+def test_bags_of_a_vehicle_are_as_one_fit_to_all_of_them():
+    rng = np.random.default_rng(13)
+    parts = [(alike(rng), rng.normal(size=80)) for _ in range(3)]
+    each = Estimates.of([screened_of(*part) for part in parts])
+    _, own = each.by_owner(["car"] * 3)
+    whole = Estimates.of([screened_of(np.vstack([columns for columns, _ in parts]),
+                                      np.concatenate([residual for _, residual in parts]))])
+    assert own.values == pytest.approx(whole.values)
+    assert own.correlations == pytest.approx(whole.correlations, abs=1e-6)
+
+
+@pytest.mark.parametrize("hidden", [(0,), (1,), (3,), (0, 3)])
+def test_the_causes_that_are_named_hold_the_one_that_is_hidden(hidden):
+    """Half of a hundredth may be wrong, of causes that look alike nearly all of the time."""
+    rng = np.random.default_rng(14)
+    lot = {"lot = B": np.arange(100) < 30, ALL: np.ones(100, bool)}
+    fleet = [alike(rng) for _ in range(100)]
+    sizes = []
+    for _ in range(20):
+        spread = rng.uniform(0.5, 1.5, 100)  # an effect that differs from vehicle to vehicle
+        estimates = Estimates.of([screened_of(
+            columns, rng.normal(size=80) + (i < 30) * spread[i] * sum(
+                2 * columns[:, cause] / np.linalg.norm(columns[:, cause]) for cause in hidden))
+            for i, columns in enumerate(fleet)])
+        [effect], _ = weak_effects(estimates, lot)
+        named = {effect.cause, *effect.confusable_with}
+        assert effect.group == "lot = B" and {"abcde"[cause] for cause in hidden} <= named
+        assert effect.at_work == len(hidden)
+        sizes.append(len(named))
+    # what looks like nothing else is named alone, what looks alike together
+    assert np.mean(sizes) < 1.2 if hidden == (3,) else 2 <= np.median(sizes) < 5
 
 
 def test_bags_of_a_vehicle_are_one_estimate():

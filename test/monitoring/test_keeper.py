@@ -75,6 +75,45 @@ def test_a_change_is_diagnosed_confirmed_applied_and_taken_back(drives, tmp_path
     assert {"result.json", "report.html", "model.yaml", "stretch.mcap"} <= names
 
 
+def three(drive, rng, changed):
+    """Sensor, reference and third of a drive, one of which shows 10 % more from 250 s on."""
+    reference, sensor = drive.samples()
+    after = drive.since_start_s(reference.stamps_ns) > 250
+    def of(name):
+        gain = np.where((name == changed) & after, 1.1, 1.0)[:, None]
+        noise = drive.noise_std * rng.normal(size=reference.values.shape)
+        return reference._replace(values=gain * reference.values + noise)
+    gain = np.where((changed == "sensor") & after, 1.1, 1.0)[:, None]
+    return (of("reference"), sensor._replace(values=gain * sensor.values), of("third"))
+
+
+@pytest.mark.parametrize("changed", [pytest.param("sensor", marks=pytest.mark.long), "reference"])
+def test_of_two_that_watch_each_other_a_third_tells_who_has_changed(tmp_path, changed):
+    drive = ChangingDrive(13, {}, duration_s=300.0)
+    keeper, _ = made(tmp_path, mutual=True)
+    try:
+        for parts in zip(*map(chunks, three(drive, np.random.default_rng(14), changed))):
+            keeper.add(*parts)
+            keeper.turn()
+        assert keeper.blamed == changed
+        assert keeper.state == ("diagnosing" if changed == "sensor" else "changed")
+        assert (keeper.diagnose("a service") == "a diagnosis is under way") == (
+            changed == "sensor")
+    finally:
+        keeper.end()
+
+
+def test_without_a_third_nobody_is_blamed(tmp_path):
+    drive = ChangingDrive(13, {}, duration_s=300.0)
+    keeper, _ = made(tmp_path, mutual=True)
+    for reference, sensor, _ in zip(*map(chunks, three(drive, np.random.default_rng(14),
+                                                       "sensor"))):
+        keeper.add(reference, sensor)
+        keeper.turn()
+    assert keeper.watch.changed is not None and keeper.blamed == "one of them"
+    assert "may be as it was" in keeper.diagnose("a service") and keeper.state == "changed"
+
+
 def test_killed_on_its_way_nothing_is_half_written_and_the_model_stays(drives, tmp_path):
     keeper, given = made(tmp_path, time_limit_s=20.0)
     fed(keeper, drives[0])

@@ -35,12 +35,23 @@ def test_the_virtual_sensor_may_use_its_topics():
     assert named_in("nodes/virtual_sensor.py") <= may
 
 
-def test_only_maintenance_may_change_a_model():
-    asking = {profile.get("node") for profile in POLICY.iter("profile")
+def test_the_diagnoser_may_use_its_topics_and_services():
+    text = (ROOT / "frac_accel" / "nodes" / "diagnoser.py").read_text()
+    assert named_in("nodes/diagnoser.py") == {"imu/data_raw", "imu/reference", "imu/third"}
+    assert named_in("nodes/diagnoser.py") <= allowed("diagnoser", "topic", "subscribe")
+    assert {"diagnostics", "diagnoser/result"} <= allowed("diagnoser", "topic", "publish")
+    own = {f"~/{name}" for name in re.findall(r'\("([a-z_]+)", (?:lambda|self\._keeper\.)', text)}
+    assert own == {"~/diagnose", "~/apply", "~/roll_back"}
+    assert own <= allowed("diagnoser", "service", "reply")
+    assert {f"diagnoser/{name[2:]}" for name in own} <= allowed("maintenance", "service", "request")
+
+
+def test_only_maintenance_and_diagnoser_may_change_a_model():
+    asking = {(profile.get("node"), service.text) for profile in POLICY.iter("profile")
               for group in profile.iter("services") if group.get("request") == "ALLOW"
-              for service in group.iter("service")
-              if re.search("set_parameters|reload_model|_sensor|change_state", service.text)}
-    assert asking == {"maintenance"}
+              for service in group.iter("service") if service.text.startswith("corrector/")}
+    assert {text for node, text in asking if node != "maintenance"} == {"corrector/set_parameters"}
+    assert {node for node, _ in asking} == {"maintenance", "diagnoser"}
     own = set(re.findall(r'"(~/[a-z]+_[a-z]+)"',
                          (ROOT / "frac_accel" / "nodes" / "corrector.py").read_text()))
     assert own == {"~/reload_model", "~/add_sensor", "~/remove_sensor"}
