@@ -19,7 +19,7 @@ from ..model.effects import effect_of
 from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
-from .problem import Problem
+from .problem import Problem, acts_on_spring
 from .search import Search
 from .stages import COMPARED
 from .stretches import Stretches, stretches_of
@@ -238,11 +238,12 @@ class Engine:
                  self.search.screen(rest)[:_RIVALS]
                  if cause not in unwanted and self.promises(rest, cost)]
         found = self.search.varied(next(iter(self.search.fit_all(begun)), rest))
-        if rest.cost - found.cost > self.threshold(found):
+        if rest.cost - found.cost <= self.threshold(found):
+            found = rest
+        elif not any(map(acts_on_spring, found.effects.values())):
+            # several linear ones may stand for several; with forces that takes minutes
             found = self.search.grow([self._own(found)], self.threshold, self.promises,
                                      self.noise_only, len(unwanted) - 1)
-        else:
-            found = rest
         # what was found beside the unwanted has met its rivals beside them only
         return self.compete(found, unwanted)
 

@@ -140,10 +140,12 @@ def _without_the_weakest(engine, here, noise_std, known):
     """A set less its weakest doubtful causes, up to two, where nothing is doubtful then, and what
     was dropped, in words; else the set as it is."""
     there, dropped = here, {}
-    for _ in range(_WEAKEST):
+    # more do not become clear by leaving out two
+    for _ in range(_WEAKEST if len(here.doubts) <= _WEAKEST + 1 else 0):
         # what comes into doubt only without another one stays
         doubtful = (there.doubts.keys() & here.doubts.keys()) - engine.uncontested
-        if not doubtful or len(there.gains) < 2:
+        if not doubtful or len(there.gains) < 2 or engine.problem.limit.ends_search(
+                "the weakest doubtful causes were not left out first"):
             break
         weakest = min(doubtful, key=lambda cause: there.gains[cause].taken)
         dropped[weakest] = there.doubts[weakest]

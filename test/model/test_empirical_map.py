@@ -84,7 +84,7 @@ def test_part_of_an_extended_model_and_of_its_correction_but_no_finding():
     reference, _, measured = bent(5, of_sensor=sensor)
     used = SensorModel.from_dict({**GAIN, "core": {"natural_frequency_hz": 300.0,
                                                    "damping_ratio": 0.6}})
-    found = diagnose(samples(reference, measured), used, time_limit_s=60)
+    found = diagnose(samples(reference, measured), used, time_limit_s=120)
     assert "empirical_map" not in [finding.cause for finding in found.findings]
     assert found.verdict in ("unexplained", "partly_explained")
     own = found.model.axis("x").effects
