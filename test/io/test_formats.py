@@ -276,7 +276,8 @@ def test_damage_is_one_line_or_none(end, folder, capfd):
     write_bag("whole.mcap", {"/imu/data_raw": random_samples(5, 60)})
     assert main(["convert", "whole.mcap", "-o", f"whole.{end}"]) == 0
     whole = (folder / f"whole.{end}").read_bytes()
-    for seed in range(40):
+    # each MDF file is read in a process of its own
+    for seed in range(12 if end == "mf4" else 40):
         rng = np.random.default_rng(seed)
         damaged = np.frombuffer(whole, np.uint8).copy()
         if seed % 3:

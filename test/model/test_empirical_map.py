@@ -78,6 +78,7 @@ def test_undone_to_the_last_bits_with_its_uncertainty():
         effect_of("empirical_map")((0.0, 1.0), (1.0, 0.0), (0.0, 0.0))
 
 
+@pytest.mark.long
 def test_part_of_an_extended_model_and_of_its_correction_but_no_finding():
     def sensor(s):
         return oscillator(s, 300.0, 0.6)
