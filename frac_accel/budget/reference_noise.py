@@ -103,10 +103,7 @@ def reference_noise(record, column, used, covariance_std=None):
     inner = _inner(frequency, record)
     power = float(np.var(one))
     most = np.quantile(own[inner], _FLOOR)
-    if _given(covariance_std) and _untrusted(covariance_std, None,
-                                             _SCATTERS * np.sqrt(most * own_rate / 2)):
-        covariance_std = None
-    for density, by in _estimates(record, column, used, covariance_std, own_rate, size):
+    for density, by in _estimates(record, column, used, covariance_std, own_rate, most, size):
         std = np.sqrt(density * own_rate / 2)
         if density <= _SCATTERS**2 * most and density * rate / 2 / power < _MOST:
             share = np.clip(1 - density / own, 0.0, 1.0)
@@ -121,7 +118,7 @@ def reference_noise(record, column, used, covariance_std=None):
             return ReferenceNoise(
                 float(std), float(known * std), by, bool(density * rate / 2 / power > _LEAST),
                 (*frequency[frequency < ends[0]].tolist(), *ends),
-                (*share[frequency < ends[0]].tolist(), *share[[-1] * len(ends)].tolist()),
+                (*share[frequency < ends[0]].tolist(), *[float(share[-1])] * len(ends)),
                 record.band_hz or np.inf)
     return None
 
@@ -131,10 +128,10 @@ def _inner(frequency, record):
     return slice(2, min(np.searchsorted(frequency, record.band_hz or np.inf), len(frequency) - 1))
 
 
-def _estimates(record, column, used, covariance_std, own_rate, size):
+def _estimates(record, column, used, covariance_std, own_rate, most, size):
     """Pairs of a density [(m/s²)²/Hz] and what shows it, the best first.
 
-    `own_rate` [Hz] is that at which the reference was sampled.
+    `own_rate` [Hz] is that at which the reference was sampled, `most` its lowest density.
     """
     rate, one, two = record.sampling_rate_hz, record.reference[:, column], record.sensor[:, column]
     if "reference" not in record.resampled:
@@ -143,7 +140,8 @@ def _estimates(record, column, used, covariance_std, own_rate, size):
                         (_at_rest(one, two, used, rate), "rest")):
             if std is not None:
                 yield 2 * std**2 / rate, by
-    if _given(covariance_std):
+    if _given(covariance_std) and not _untrusted(covariance_std, None,
+                                                 _SCATTERS * np.sqrt(most * own_rate / 2)):
         yield 2 * covariance_std**2 / own_rate, "covariance"
     density = _floor(one, two, record, size)
     if density is not None:

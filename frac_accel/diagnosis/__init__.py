@@ -153,7 +153,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     _require_relation(engine, axis, seed)
     best = engine.run(seed)
     stages.enter("judging what was found", JUDGED)
-    judged = judge(engine, best, found, shown, loose, source[1], noise_std)
+    judged = judge(engine, best, found, shown, source[1], noise_std)
     return dataclasses.replace(judged, screened=screened(engine)) if screening else judged
 
 

@@ -140,9 +140,14 @@ def _filters(engine, best):
             and (is_link(effect) or effect.pure_delay_s() or effect.restates_core)}
 
 
+def _linear_share(engine, fitted):
+    """Share of what a fit leaves that a linear filter would take; 0 where that is noise."""
+    return sum(share for share, part in engine.structure(fitted) if part == "linear")
+
+
 def _imitators(engine, best, takes, left):
     """Linear causes beside which a filter would take still more: they imitate something else."""
-    share = sum(share for share, part in engine.structure(best) if part == "linear")
+    share = _linear_share(engine, best)
     filters = _filters(engine, best)
     if not share or not filters:
         return {}
@@ -158,7 +163,7 @@ def _imitators(engine, best, takes, left):
 
 def resembles(engine, fitted, effect, taken):
     """Why a delay or a shift of the core is not named that a filter would be better than, or ""."""
-    share = sum(share for share, part in engine.structure(fitted) if part == "linear")
+    share = _linear_share(engine, fitted)
     if not (effect.pure_delay_s() or effect.restates_core) \
             or taken > _RESEMBLES * math.sqrt(share) * engine.left(fitted).rms:
         return ""

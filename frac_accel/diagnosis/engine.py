@@ -151,8 +151,7 @@ class Engine:
 
         Only what takes time to show is added.
         """
-        known = {cause: effect for cause, effect in effects.items()
-                 if cause not in self.search.base}
+        known = self._beside_base(effects)
         self.search.candidates = [cause for cause in self.search.candidates
                                   if effect_of(cause).shows_with_time]
         self.uncontested = self.part.uncontested
@@ -242,13 +241,14 @@ class Engine:
             found = rest
         elif not any(map(acts_on_spring, found.effects.values())):
             # several linear ones may stand for several; with forces that takes minutes
-            found = self.search.grow([self._own(found)], self.threshold, self.promises,
-                                     self.noise_only, len(unwanted) - 1)
+            found = self.search.grow([self._beside_base(found.effects)], self.threshold,
+                                     self.promises, self.noise_only, len(unwanted) - 1)
         # what was found beside the unwanted has met its rivals beside them only
         return self.compete(found, unwanted)
 
-    def _own(self, fitted):
-        return {cause: effect for cause, effect in fitted.effects.items()
+    def _beside_base(self, effects):
+        """Those of some effects that are not in every fit."""
+        return {cause: effect for cause, effect in effects.items()
                 if cause not in self.search.base}
 
     def rivals(self, best, cause):

@@ -38,7 +38,7 @@ _NEARLY = 0.05
 _MOVED = 5.0
 
 
-def judge(engine, best, found, shown, loose, sensor, noise_std=None):
+def judge(engine, best, found, shown, sensor, noise_std=None):
     """Verdict on the best set of causes.
 
     Parameters
@@ -48,8 +48,6 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
     found : Integrity
     shown : dict of str to Effect
         Causes that the record shows by itself.
-    loose : dict of str to Open
-        Causes that were free in every fit.
     sensor : Samples
         The sensor's samples as they were recorded.
     noise_std : float, optional
@@ -94,7 +92,6 @@ def judge(engine, best, found, shown, loose, sensor, noise_std=None):
         else:
             suspects.append(_suspect({cause, *instead}, margin, "another cause explains as much"))
     return _verdict(engine, best, left, findings, suspects, found, noise,
-                    lambda fitted, stds: _moved(engine, fitted, loose, stds),
                     lambda fitted: read_off(engine, fitted, found, shown, sensor))
 
 
@@ -197,7 +194,7 @@ def _suspect(causes, margin, reason):
             "experiment": separating_experiment(causes)}
 
 
-def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_by):
+def _verdict(engine, best, left, findings, suspects, found, noise, shown_by):
     p = engine.problem
     rest = engine.held_out_rows
     spread = float(np.std(p.measured[rest]))
@@ -228,7 +225,7 @@ def _verdict(engine, best, left, findings, suspects, found, noise, moved, shown_
                     if f.cause in fitted.effects else f for f in findings]
         fraction = remaining(fitted)
     # beside the model as it is in the end, not beside one with what is only suspected
-    away, near = moved(fitted, stds)
+    away, near = _moved(engine, fitted, stds)
     suspects += [_suspect({cause}, 0.0, words) for cause, words in near.items()]
     findings = [*findings, *away, *shown_by(fitted)]
     if any(f.effect.goes_with_size for f in findings):
@@ -346,11 +343,11 @@ def _confidence(margin):
     return float(expit(margin / 2))
 
 
-def _moved(engine, best, loose, stds):
+def _moved(engine, best, stds):
     """Findings among the causes that were free: farther from the model than it allows for; and
     those in doubt, with words."""
     findings, doubtful = [], {}
-    for cause, entry in loose.items():
+    for cause, entry in engine.loose.items():
         effect = best.effects[cause]
         farthest = max(abs(getattr(effect, name) - getattr(entry.effect, name))
                        / np.hypot(std, stds[cause].get(name, 0.0))
