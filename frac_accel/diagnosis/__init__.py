@@ -115,26 +115,14 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     noise = reference_noise(record, column, used, _stated_noise(source[0], column))
     if noise and noise.bends:
         found = dataclasses.replace(found, reference_noise=noise, words=[*found.words, noise.words])
-    shown = _shown(found, record.sensor[:, column])
-    stray = used & spikes(record.sensor[:, column], record.reference[:, column])
-    used &= ~stray
-    for effect in shown.values():
-        used &= ~effect.spoiled(record.sensor[:, column])
-    split = learning_length(record.reference[:, column])
-    for rows, part in ((used[:split], "training"), (used[split:], "held-out")):
-        if rows.sum() < _FEWEST // 4:
-            return insufficient(f"only {rows.sum()} {part} samples; {_FEWEST // 4} needed", model,
-                                found)
-    seed = None
+    shown, used, stray = _shown(found, record, column, used)
+    poor = _too_poor(record, column, used, model)
+    if poor:
+        return insufficient(poor, model, found)
+    stds, seed = _stated(model, axis) if model else {}, None
     if model is None:
         stages.enter("identifying a classical model", IDENTIFIED)
-        try:
-            require_excitation(record.reference[:, column], record.sampling_rate_hz, _COEFFICIENTS)
-        except IdentificationError as error:
-            return insufficient(str(error), model, found)
         model, stds, seed = _classical(record, axis, used, limit)
-    else:
-        stds = _stated(model, axis)
     # the common lag of the stamps is a median of scattered ones
     loose = _left_open(model.axis(axis), stds, 1.25 * found.jitter_rms_s / np.sqrt(found.samples))
     engine = functools.partial(
@@ -187,16 +175,37 @@ def _without_spikes(engine, used, stray, reference):
     # where samples do not count the residual is 0, and steps at their edges are no spikes
     p = first.problem
     inside = binary_erosion(p.used, iterations=_EDGE)
-    more = p.put_back(inside & spikes(first.search.fit(first.search.base).residual,
+    more = p.put_back(inside & spikes(first.search.baseline.residual,
                                       p.taken(reference)), np.zeros(len(used), bool))
     return (engine(used=used & ~more) if more.any() else first), stray | more
 
 
-def _shown(found, measured):
-    """Causes that the record shows by itself."""
+def _shown(found, record, column, used):
+    """Causes that the record shows by itself; the samples that count with these; its spikes."""
+    measured = record.sensor[:, column]
     effects = {cause: effect.of_record(found, measured)
                for cause, effect in known_effects().items() if effect.read_off}
-    return {cause: effect for cause, effect in effects.items() if effect is not None}
+    effects = {cause: effect for cause, effect in effects.items() if effect is not None}
+    stray = used & spikes(measured, record.reference[:, column])
+    used = used & ~stray
+    for effect in effects.values():
+        used &= ~effect.spoiled(measured)
+    return effects, used, stray
+
+
+def _too_poor(record, column, used, model):
+    """Words where a record holds too little to be judged, or, without a model, to identify one."""
+    reference = record.reference[:, column]
+    split = learning_length(reference)
+    for rows, part in ((used[:split], "training"), (used[split:], "held-out")):
+        if rows.sum() < _FEWEST // 4:
+            return f"only {rows.sum()} {part} samples; {_FEWEST // 4} needed"
+    try:
+        if model is None:
+            require_excitation(reference, record.sampling_rate_hz, _COEFFICIENTS)
+    except IdentificationError as error:
+        return str(error)
+    return None
 
 
 def _classical(record, axis, used, limit):
@@ -277,7 +286,7 @@ def _require_direction(engine, axis, start):
 def _best_of_one(engine, measured, used):
     """Share of the sensor's power that the model explains the right way round with one cause."""
     search = engine.search
-    bare = search.fit(search.base)
+    bare = search.baseline
     fits = search.fit_all([search.begun(bare, cause, begin)
                            for _, cause, begin in search.screen(bare)[:_TRIED]])
     return max((_shared(measured, fit.output, used) for fit in fits), default=0.0)

@@ -414,7 +414,7 @@ class Engine:
 
     def predicts_better(self, fitted):
         """Whether a fit predicts the held-out part better than the model in use describes it."""
-        bare = self.search.fit(self.search.base)
+        bare = self.search.baseline
         return gain(*((self.problem.measured - fit.output)[self.held_out_rows]
                       for fit in (bare, self.learnt(fitted)))).is_relevant
 

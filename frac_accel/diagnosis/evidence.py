@@ -185,7 +185,7 @@ def _arrays_of(mapping):
 
 def _compared(engine, fitted, named):
     """Outputs and residuals (NaN where a sample does not count) by model."""
-    p, bare = engine.problem, engine.search.fit(engine.search.base)
+    p, bare = engine.problem, engine.search.baseline
     outputs, residuals = {IN_USE: bare.output}, {IN_USE: bare.residual}
     if named:
         output = fitted.output
@@ -242,7 +242,7 @@ def _rivals(engine, best):
     """The chosen set, those that describe the record best, and the model in use, as `Rival`."""
     search, samples = engine.search, engine.problem.count
     variance = best.cost / samples * noise_peak(best.residual, engine.problem.used)
-    own, bare = engine.score(best, variance), search.fit(search.base)
+    own, bare = engine.score(best, variance), search.baseline
     others = sorted((fit for fit in search.fits.values()
                      if fit.causes not in (best.causes, bare.causes)), key=lambda fit: fit.cost)
     shown = [best, *others[:_MOST_RIVALS], *([bare] if bare is not best else [])]

@@ -18,7 +18,15 @@ from .experiments import separating_experiment
 from .finding import Diagnosis, Finding
 from .gain import gain
 from .read_off import read_off
-from .words import gain_words, is_accounted, reason_of, set_aside, verdict_of
+from .words import (
+    description_words,
+    gain_words,
+    hidden_words,
+    is_accounted,
+    reason_of,
+    set_aside,
+    verdict_of,
+)
 
 # Times that another set is looked for in which no cause is doubtful.
 _AGAIN = 2
@@ -195,35 +203,12 @@ def _suspect(causes, margin, reason):
 
 
 def _verdict(engine, best, left, findings, suspects, found, noise, shown_by):
-    p = engine.problem
-    rest = engine.held_out_rows
-    spread = float(np.std(p.measured[rest]))
-    baseline = engine.search.fit(engine.search.base)
-    before = _rms(p.measured - baseline.output, rest)
-    noise_rms = left.noise_rms
-    excess = max(baseline.cost / p.count - noise_rms**2, 0.0)
-
-    def remaining(fitted):
-        power = max(fitted.cost / p.count - noise_rms**2, 0.0)
-        return power / excess if excess > 0 else 0.0
-
-    # differences that chance makes are no remains
-    fraction = remaining(best) if left.share > 0 else 0.0
-    if left.share > 0:
-        # something is left, which the causes may have been bent by, or mistaken for
-        doubtful = {f.cause for f in findings if f.cause in best.effects
-                    and (fraction > _LEFT or engine.unsteadiness(best, f.cause) > _STEADY)}
-        suspects += [_suspect({cause}, 0.0, "too much is left that it does not explain")
-                     for cause in sorted(doubtful)]
-        findings = [f for f in findings if f.cause not in doubtful]
-    fitted, stds, dropped = _refitted(engine, best, {f.cause for f in findings})
-    suspects += [_suspect({cause}, 0.0, words) for cause, words in dropped.items()]
-    findings = [f for f in findings if f.cause not in dropped]
+    fraction = _remaining(engine, best, left.noise_rms) if left.share > 0 else 0.0
+    findings, fitted, stds, more = _sure(engine, best, findings, left, fraction)
+    suspects += more
     complete = fitted.causes == best.causes
     if not complete:
-        findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
-                    if f.cause in fitted.effects else f for f in findings]
-        fraction = remaining(fitted)
+        fraction = _remaining(engine, fitted, left.noise_rms)
     # beside the model as it is in the end, not beside one with what is only suspected
     away, near = _moved(engine, fitted, stds)
     suspects += [_suspect({cause}, 0.0, words) for cause, words in near.items()]
@@ -231,44 +216,92 @@ def _verdict(engine, best, left, findings, suspects, found, noise, shown_by):
     if any(f.effect.goes_with_size for f in findings):
         left = dataclasses.replace(left, level_score=0.0)
         fraction = fraction if left.share > 0 else 0.0
-    after = before if fitted.causes == baseline.causes else _rms(
+    account = _account(engine, fitted, findings, noise)
+    strange = engine.structure(fitted)
+    # beside a model that leaves nothing that stands out, what is only suspected is chance
+    plain = not findings and not strange and engine.left(fitted).share == 0
+    verdict = verdict_of(
+        findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
+        fraction, account.accounted, strange or account.faulty)
+    described, after = _described(engine, fitted, account.after, {part for _, part in strange}) \
+        if verdict in _INCOMPLETE or strange else ({}, account.after)
+    named = {f.cause: f.effect for f in findings}
+    model = _extended(engine, {**fitted.effects, **named, **{e.cause: e for e in described}})
+    p, spread = engine.problem, account.spread
+    return Diagnosis(
+        verdict, reason_of(verdict, account.error / spread, noise, account.accounted, strange)
+        + set_aside(engine.aside, engine.record.valid) + description_words([*described.values()])
+        + hidden_words(account.own, account.error),
+        {"rmse": account.before, "nrmse": account.before / spread, "noise_rms": left.noise_rms},
+        findings, suspects,
+        {"rmse": after, "nrmse": after / spread},
+        float(min(fraction, 1.0)), model, found,
+        Evidence.of(engine, best, named),
+        noise.as_dict(), p.limit.summary(),
+        [*engine.budget(engine.search.baseline).as_list("baseline"),
+         *engine.budget(fitted).as_list("extended")])
+
+
+def _remaining(engine, fitted, noise_rms):
+    """Share of the power that the model in use leaves beyond the noise which is still left."""
+    count = engine.problem.count
+    excess = max(engine.search.baseline.cost / count - noise_rms**2, 0.0)
+    return max(fitted.cost / count - noise_rms**2, 0.0) / excess if excess > 0 else 0.0
+
+
+def _sure(engine, best, findings, left, fraction):
+    """The findings that stand where something is left; the model of these alone, with its
+    uncertainties; and the others as suspects."""
+    doubtful = set()
+    if left.share > 0:
+        # something is left, which the causes may have been bent by, or mistaken for
+        doubtful = {f.cause for f in findings if f.cause in best.effects
+                    and (fraction > _LEFT or engine.unsteadiness(best, f.cause) > _STEADY)}
+    fitted, stds, dropped = _refitted(engine, best, {f.cause for f in findings} - doubtful)
+    findings = [f for f in findings if f.cause not in doubtful and f.cause not in dropped]
+    if fitted.causes != best.causes:
+        findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
+                    if f.cause in fitted.effects else f for f in findings]
+    words = {**dict.fromkeys(sorted(doubtful), "too much is left that it does not explain"),
+             **dropped}
+    return findings, fitted, stds, [_suspect({cause}, 0.0, why) for cause, why in words.items()]
+
+
+class Account(NamedTuple):
+    """RMS of the sensor's signal on held-out data (`spread`), and of what is left of it there
+    before and after; of what is left of the whole record (`error`), and of the noise that the
+    reference puts into it (`own`), all in output units; whether that is accounted for; and whether
+    it is no longer with the samples that were set aside."""
+
+    spread: float
+    before: float
+    after: float
+    error: float
+    own: float
+    accounted: bool
+    faulty: bool
+
+
+def _account(engine, fitted, findings, noise):
+    p, rest = engine.problem, engine.held_out_rows
+    spread = float(np.std(p.measured[rest]))
+    before = _rms(p.measured - engine.search.baseline.output, rest)
+    after = before if fitted.causes == engine.search.baseline.causes else _rms(
         p.measured - engine.learnt(fitted).output, rest)
     # what the record shows by itself, such as scattered stamps, is no part of the model
     by_itself = [f.gain.after for f in findings if f.cause not in fitted.effects]
     own = engine.by_reference(fitted)
-
-    def beyond(rms):
-        """What the reference's own noise does not account for."""
-        return np.sqrt(max(rms**2 - own**2, 0.0))
     # the record is all of it, not only the part that is held out
     errors = p.errors(fitted)
     error = max(after, _rms(errors, engine.wanted & np.isfinite(errors)))
-    accounted = is_accounted(beyond(min([error, *by_itself])), spread, noise)
-    faulty = accounted and not is_accounted(
-        beyond(_rms(errors, (engine.wanted | engine.aside) & np.isfinite(errors))), spread, noise)
-    strange = engine.structure(fitted)
-    # beside a model that leaves nothing that stands out, what is only suspected is chance
-    plain = not findings and not strange and engine.left(fitted).share == 0
-    verdict = verdict_of(findings, [] if plain else suspects, complete,
-                         0.0 if plain else left.share, fraction, accounted, strange or faulty)
-    effects = {**fitted.effects, **{f.cause: f.effect for f in findings}}
-    described, after = _described(engine, fitted, after, {part for _, part in strange}) \
-        if verdict in _INCOMPLETE or strange else ({}, after)
-    model = _extended(engine, {**effects, **{e.cause: e for e in described}})
-    description = (f"; the extended model has {' and '.join(described.values())}, which describes "
-                   "a part of it and names nothing") if described else ""
-    return Diagnosis(
-        verdict, reason_of(verdict, error / spread, noise, accounted, strange)
-        + set_aside(engine.aside, engine.record.valid) + description
-        + (f"; {min(own / error, 1.0)**2:.0%} of that power is what the reference's own noise hides"
-           if own > 0.1 * error else ""),
-        {"rmse": before, "nrmse": before / spread, "noise_rms": noise_rms},
-        findings, suspects,
-        {"rmse": after, "nrmse": after / spread},
-        float(min(fraction, 1.0)), model, found,
-        Evidence.of(engine, best, {f.cause: f.effect for f in findings}),
-        noise.as_dict(), p.limit.summary(),
-        [*engine.budget(baseline).as_list("baseline"), *engine.budget(fitted).as_list("extended")])
+    everywhere = _rms(errors, (engine.wanted | engine.aside) & np.isfinite(errors))
+
+    def is_covered(rms):
+        """Whether what the reference's own noise does not make is accounted for."""
+        return is_accounted(np.sqrt(max(rms**2 - own**2, 0.0)), spread, noise)
+    accounted = is_covered(min([error, *by_itself]))
+    return Account(spread, before, after, error, own, accounted,
+                   accounted and not is_covered(everywhere))
 
 
 def _refitted(engine, best, named):

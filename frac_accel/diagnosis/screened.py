@@ -89,14 +89,14 @@ def screened(engine):
         ``estimates`` as of `Screen.estimates` and ``correlations``.
     """
     screen = screen_of(engine)
-    residual = engine.search.fit(engine.search.base).residual[engine.problem.used]
+    residual = engine.search.baseline.residual[engine.problem.used]
     return {"estimates": screen.estimates(residual), "correlations": screen.correlations()}
 
 
 def screen_of(engine):
     """`Screen` of the model in use on an engine's record."""
     search, used = engine.search, engine.problem.used
-    fitted = search.fit(search.base)
+    fitted = search.baseline
     taken = _orthonormal(np.hstack([fitted.free[used], fitted.jacobian[used]]))
     view = search.view(fitted)
     found = {}

@@ -80,6 +80,11 @@ class Search:
             self._keep(self.problem.finished(known) if known else self.problem.fit(effects))
         return self.fits[frozenset(effects)]
 
+    @property
+    def baseline(self):
+        """The model in use, with what is free in every fit."""
+        return self.fit(self.base)
+
     def to_its_best(self, fitted):
         """A fit that what is reported rests on: trials end as soon as they cannot win."""
         better = self.problem.carried_on(self.fit(fitted.effects))

@@ -1,6 +1,5 @@
 """The verdict and its words."""
 
-
 from ..budget import WORDS
 
 # Share of the output's RMS that may be left without noise being established, and factor by which an
@@ -11,6 +10,8 @@ AS_NOISE = 1.2
 _NOTHING = 0.005
 # Share of the residual's power that may be no noise in a record that counts as explained.
 _MOSTLY_NOISE = 0.3
+# Share of an error by which the reference's own noise is worth a word.
+_HIDDEN = 0.1
 
 
 def is_accounted(rmse, spread, noise):
@@ -57,6 +58,18 @@ def set_aside(aside, valid):
     share = aside.sum() / valid.sum()
     return f"; {aside.sum()} samples ({share:.2%}) do not count: a signal stood still or had " \
            "spikes there" if aside.any() else ""
+
+
+def description_words(described):
+    """Words for what the extended model holds beside causes."""
+    return (f"; the extended model has {' and '.join(described)}, which describes a part of it and "
+            "names nothing") if described else ""
+
+
+def hidden_words(own, error):
+    """Words for what the reference's own noise (RMS) makes of an error (RMS)."""
+    return (f"; {min(own / error, 1.0)**2:.0%} of that power is what the reference's own noise "
+            "hides") if own > _HIDDEN * error else ""
 
 
 def _unknown(noise):

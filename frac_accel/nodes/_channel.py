@@ -104,7 +104,7 @@ class Channel:
             refused_subscribers=refused_subscribers,
             seconds_since_message=silent_s,
             stated_rate_hz=self._sensor.value("sample_rate_hz"),
-            sample_rate_hz=design.sampling_rate_hz if design else None,
+            sampling_rate_hz=design.sampling_rate_hz if design else None,
             warm_up_samples=design.warm_up_samples if design else None,
             counters=counters, changes=changes, load=load, findings=self._findings,
             reference_silent_s=reference_silent_s, zero_stamps=self._zero_stamps,

@@ -67,7 +67,7 @@ class Situation:
         None if there never was one.
     stated_rate_hz : float
         Parameter ``sample_rate_hz``; 0: to be estimated.
-    sample_rate_hz : float or None
+    sampling_rate_hz : float or None
         Rate in use.
     warm_up_samples : int or None
         Samples that the filter needs before its first output.
@@ -109,7 +109,7 @@ class Situation:
     refused_subscribers: tuple = ()
     seconds_since_message: float | None = None
     stated_rate_hz: float = 0.0
-    sample_rate_hz: float | None = None
+    sampling_rate_hz: float | None = None
     warm_up_samples: int | None = None
     counters: dict = dataclasses.field(default_factory=dict)
     changes: dict = dataclasses.field(default_factory=dict)
@@ -155,7 +155,7 @@ def _judge(situation):
     grave, troubles = _grave(situation), _troubles(situation)
     if grave or troubles:
         return (ERROR if grave else WARN), "; ".join([*grave, *troubles])
-    return OK, f"correcting at {situation.sample_rate_hz:.6g} Hz"
+    return OK, f"correcting at {situation.sampling_rate_hz:.6g} Hz"
 
 
 def _silence(s):
@@ -209,7 +209,7 @@ def _no_output(s):
         causes = ", ".join(f"{count} {_DROPPED[name]}" for name, count in dropped.items() if count)
         hint = ("; sample_rate_hz may be too low" if dropped["early"] else "")
         return ERROR, f"all {received} samples of the last second were dropped: {causes}{hint}"
-    if s.sample_rate_hz is None:
+    if s.sampling_rate_hz is None:
         return _no_rate(s)
     if idle and s.seconds_since_message is not None:
         return None  # a busy machine looks twice in a row: nothing can have come in between

@@ -73,7 +73,7 @@ class Snapshot:
     Attributes
     ----------
     raw, corrected, reference : tuple of ndarray
-    sample_rate_hz : float or None
+    sampling_rate_hz : float or None
         Rate of raw and corrected; None while it is not known.
     bands : sequence of sequence of (float, float)
         Adjoining bands [Hz] for each axis.
@@ -82,7 +82,7 @@ class Snapshot:
     raw: tuple
     corrected: tuple
     reference: tuple
-    sample_rate_hz: float | None
+    sampling_rate_hz: float | None
     bands: tuple
 
 
@@ -162,10 +162,10 @@ def evaluate(snapshot):
         if len(snapshot.corrected[1]):
             figures[f"{axis}/corrected/std"] = float(np.std(snapshot.corrected[1][:, i]))
     overlap = None
-    if snapshot.sample_rate_hz and len(snapshot.reference[0]) >= FEWEST_SAMPLES:
+    if snapshot.sampling_rate_hz and len(snapshot.reference[0]) >= FEWEST_SAMPLES:
         for name in ("raw", "corrected"):
             errors = errors_against(snapshot.reference, getattr(snapshot, name),
-                                    snapshot.sample_rate_hz, snapshot.bands)
+                                    snapshot.sampling_rate_hz, snapshot.bands)
             overlap = bool(overlap) or bool(errors)
             for axis, of_axis in (errors or {}).items():
                 figures.update(_named(f"{axis}/{name}", of_axis))
