@@ -54,8 +54,10 @@ def doubts_about(engine, best, gains, stds, left, noise):
     own, added = engine.by_reference(best), {cause: engine.added(best, cause) for cause in gains}
     for cause in gains:
         rms = min(takes[cause], engine.rms(added[cause]))
-        if rms < _BY_ITSELF * takes[cause]:
-            doubts.setdefault(cause, f"it changes the output by {rms:.3g} RMS only: the rest of "
+        # where it was judged: what comes and goes may do less elsewhere
+        there = float(np.sqrt(np.mean(added[cause][engine.held_out_rows]**2)))
+        if max(rms, there) < _BY_ITSELF * takes[cause]:
+            doubts.setdefault(cause, f"it changes the output by {there:.3g} RMS only: the rest of "
                                      f"what it explains ({takes[cause]:.3g} RMS) is a free motion "
                                      "of its own")
         # noise makes nothing that changes with time
@@ -292,6 +294,15 @@ def _elsewhen(engine, best, takes, left):
                 and taken < _RESEMBLES * math.sqrt(share) * left.rms:
             found[cause] = f"{share:.0%} of what is left changes with time: the course in time " \
                            "is another one"
+    courses = [cause for cause in takes if best.effects[cause].shows_with_time
+               and not best.effects[cause].everyday]
+    weak = [cause for cause in courses if takes[cause] < WEIGHS * engine.rms(best.residual)]
+    if len(courses) > 1:
+        # a sweep's frequency and level change with time, too: several follow any course
+        for cause in weak:
+            found.setdefault(cause, f"{', '.join(courses)} together follow any course in time, "
+                                    f"and it takes {takes[cause]:.3g} RMS only beside "
+                                    f"{engine.rms(best.residual):.3g} that are left")
     return found
 
 

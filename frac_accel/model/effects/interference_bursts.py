@@ -29,6 +29,8 @@ _SHOWN = 0.01
 _REPEATED = 0.5
 # Share of what two noises gain that a noise which grows with the motion may gain.
 _AS_GOOD = 0.5
+# Samples around a missing one in which a filter still answers to what was put in its place.
+_AROUND_MISSING = 10
 _PASSES = 60
 _WINDOW = 5
 
@@ -54,8 +56,8 @@ class InterferenceBursts(Effect):
     @classmethod
     def recognised(cls, seen, shown):
         """A mixture of two noises, the louder one in stretches that the motion does not explain."""
-        error = (seen.measured - seen.output)[seen.used]
-        output = seen.output[seen.used]
+        used = seen.used & ~_near(~seen.record.valid)
+        error, output = (seen.measured - seen.output)[used], seen.output[used]
         if len(error) < 10 * _WINDOW or seen.record.resampled:
             return None  # where the motion is too fast for one topic, the other's instants lack it
         noise, loud, share, better = _two_noises(error)
@@ -67,7 +69,7 @@ class InterferenceBursts(Effect):
         if len(starts) < _FEWEST or _going_on(error, noise) < _GOES_ON \
                 or _follows(inside, error, output, len(starts)) \
                 or _grows(error, output) > _AS_GOOD * better \
-                or _repeated(seen.measured[seen.used], inside) > _REPEATED:
+                or _repeated(seen.measured[used], inside) > _REPEATED:
             return None
         length = inside.sum() / len(starts)
         rms = float(np.sqrt(loud - noise))
@@ -77,6 +79,11 @@ class InterferenceBursts(Effect):
         return cls(float(share), rms), Reading(stds, error, after, (
             f"{len(starts)} bursts of {length:.3g} samples on average, "
             f"{np.sqrt(loud / noise):.3g} times as loud as the rest, whatever the motion does"))
+
+
+def _near(missing):
+    """Samples around missing ones."""
+    return np.convolve(missing, np.ones(2 * _AROUND_MISSING + 1), "same") > 0.5
 
 
 def _two_noises(error):

@@ -59,15 +59,18 @@ class SamplingJitter(Effect):
                 own - likelihood(error, fits[name][0] + fits[name][1] * squares[name]) < _BETTER
                 for name in ("level", "bend")):
             return None
-        if not all(follows(error, noise + factor * squares["slope"], squares[name])
-                   for name in ("slope", "level")):
+        # to second order: a normal shift's square has three times its variance's square on average
+        both = squares["slope"] + 0.75 * factor * squares["bend"]
+        noise, factor, std = variance_law(error, both)
+        power = noise + factor * both
+        if not all(follows(error, power, squares[name]) for name in ("slope", "level")):
             return None
-        shift = error * slope[used] / (noise + factor * squares["slope"])
+        shift = error * slope[used] / power
         if any(abs(np.corrcoef(shift[lag:], shift[:-lag])[0, 1]) > _INDEPENDENT
                for lag in (1, 2, 3)):
             return None
         rms = float(np.sqrt(factor))
-        after = error * np.sqrt(noise / (noise + factor * squares["slope"]))
+        after = error * np.sqrt(noise / power)
         return cls(rms / rate), Reading(
             {"rms_s": float(std / (2 * rms) / rate)}, error, after,
             f"the error's power follows the square of the slope: {share:.0%} of it, "
