@@ -30,6 +30,7 @@ from .spikes import spikes
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
 from .stretches import MOST, strongest_part
 from .time_limit import TimeLimit
+from .turned import with_turn
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]
 
@@ -104,7 +105,8 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     column = AXES.index(axis)
     stages.enter("checking the data", CHECKED)
     record = Record.of(*source, axis, temperature)
-    record, source, turned = _in_axes_of_reference(record, source, axis, temperature, model)
+    record, source, orientation, turned = _in_axes_of_reference(
+        record, source, axis, temperature, model)
     found = record.integrity(column)
     found.words.extend(turned)
     if len(record) < _FEWEST:
@@ -142,26 +144,31 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     best = engine.run(seed)
     stages.enter("judging what was found", JUDGED)
     judged = judge(engine, best, found, shown, source[1], noise_std)
+    if orientation:
+        judged = with_turn(judged, engine, orientation)
     return dataclasses.replace(judged, screened=screened(engine)) if screening else judged
 
 
 def _in_axes_of_reference(record, source, axis, temperature, model):
-    """The record of a sensor whose axis follows another one, turned; its topics, and words."""
+    """The record of a sensor whose axis follows another one, turned; its topics, `Orientation`
+    (None where it was not turned), and words."""
     orientation = Orientation.of(record)
     if orientation is None:
-        return record, source, []
+        return record, source, None, []
     if model and orientation.opposes(axis, -1 if _inverts(model.axis(axis)) else 1):
-        return record, source, [f"the sensor's {axis} axis points the other way than the model "
-                                "says, or its polarity is reversed: a gain below zero says that"]
+        return record, source, None, [
+            f"the sensor's {axis} axis points the other way than the model says, or its polarity "
+            "is reversed: a gain below zero says that"]
     if not orientation.astray(axis):
-        return record, source, []
+        return record, source, None, []
     try:
         source = source[0], orientation.turn(source[1])
         turned = Record.of(*source, axis, temperature)
     except FracAccelError:
-        return record, source, []  # the refusal says which axis it follows
-    return turned, source, [f"the sensor lies turned: {orientation.words}; what follows holds for "
-                            "its signal turned into the reference's axes"]
+        return record, source, None, []  # the refusal says which axis it follows
+    return turned, source, orientation, [
+        f"the sensor lies turned: {orientation.words}; what follows holds for its signal turned "
+        "into the reference's axes"]
 
 
 def _inverts(own):

@@ -1,6 +1,7 @@
 """Gain of a cause on data that the fit has not seen."""
 
 import dataclasses
+import math
 
 import numpy as np
 
@@ -60,3 +61,9 @@ def gain(before, after):
     rms = np.sqrt(powers.sum(axis=1) / len(before))
     return Gain(float(rms[0]), float(rms[1]), float(1 - rms[1] / max(rms[0], 1e-300)),
                 (float(low), float(high)))
+
+
+def certainty(g):
+    """Chance that a `Gain` is above zero, as its bootstrap interval has it."""
+    std = max((g.ci95[1] - g.ci95[0]) / 3.92, 1e-12)
+    return 0.5 + 0.5 * math.erf(g.reduction / std / math.sqrt(2))

@@ -1,7 +1,6 @@
 """Causes that a record shows by itself: limits, lattice, stamps, bursts."""
 
 import dataclasses
-import math
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -9,7 +8,7 @@ from scipy.signal import resample_poly
 
 from ..model.effects import known_effects
 from .finding import Finding
-from .gain import gain
+from .gain import certainty, gain
 from .leftover import rounding_errors
 from .words import gain_words
 
@@ -75,12 +74,6 @@ def _moving_share(reference):
     return float(power.mean()**2 / max(np.mean(power**2), 1e-300))
 
 
-def _certainty(g):
-    """Chance that a gain is above zero, as its bootstrap interval has it."""
-    std = max((g.ci95[1] - g.ci95[0]) / 3.92, 1e-12)
-    return 0.5 + 0.5 * math.erf(g.reduction / std / math.sqrt(2))
-
-
 def read_off(engine, fitted, found, shown, sensor):
     """Findings that the record shows by itself: limits, lattice, stamps."""
     p, findings = engine.problem, []
@@ -104,6 +97,6 @@ def read_off(engine, fitted, found, shown, sensor):
         g = engine.held_out(fitted, cause) if cause in engine.search.base \
             else gain(reading.before, reading.after)
         if g.is_relevant:
-            findings.append(Finding(effect, reading.std, _certainty(g), [], [
+            findings.append(Finding(effect, reading.std, certainty(g), [], [
                 reading.evidence, *gain_words(cause, g, np.inf, [])], g))
     return findings

@@ -10,6 +10,8 @@ from ..errors import FracAccelError
 # 0.8 of the Nyquist frequency.
 _HALF_WIDTH = 32
 _KAISER = 9.0
+# Spread of a band's signal, of its largest value, below which it is one value and rounding.
+_CONSTANT = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,12 +122,12 @@ def error_metrics(reference, signal, sampling_rate_hz, bands):
             return BandError(tuple(band), *[float("nan")] * 4)
         transfer = np.sum(np.conj(x) * y) / power
         a, b = np.fft.irfft(x, n)[middle], np.fft.irfft(y, n)[middle]
+        spread = np.std(a) if np.std(a) > _CONSTANT * np.max(np.abs(a)) else np.nan
         return BandError(
             tuple(map(float, band)),
             amplitude_error=float(np.sqrt(np.sum(np.abs(y)**2) / power) - 1),
             phase_error_deg=float(np.degrees(np.angle(transfer))),
-            nrmse=float(np.sqrt(np.mean((b - a)**2)) / np.std(a)) if np.std(a) > 0
-            else float("nan"),
+            nrmse=float(np.sqrt(np.mean((b - a)**2)) / spread),
             peak_error=float(np.max(np.abs(b - a)) / np.max(np.abs(a))))
 
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -105,7 +105,8 @@ def test_turned_samples_lie_like_the_reference():
 
 @pytest.mark.parametrize("seed", range(2))
 def test_identify_and_diagnose_say_the_same_of_a_turned_sensor(seed):
-    record = turned_record(np.random.default_rng([7, seed]), [[0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    turn = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    record = turned_record(np.random.default_rng([7, seed]), turn)
     with pytest.raises(FracAccelError) as refused:
         identify(Record.of(*record))
     assert "exchanged: sensor x follows reference z" in str(refused.value)
@@ -113,7 +114,12 @@ def test_identify_and_diagnose_say_the_same_of_a_turned_sensor(seed):
     assert any("lies turned: sensor x follows reference z" in line
                for line in found.as_dict()["integrity"])
     # its own signal, in the reference's axes, has no fault
-    assert not found.findings and found.extended["nrmse"] < 0.21
+    assert [finding.cause for finding in found.findings] == ["misalignment"]
+    assert found.extended["nrmse"] < 0.21
+    (misalignment,) = found.findings
+    off = Rotation.from_matrix(misalignment.effect.rotation @ turn).magnitude()
+    assert np.degrees(off) < 4 * misalignment.std["yaw_deg"]
+    assert all(found.model.axis(axis).effects[-1] == misalignment.effect for axis in "xyz")
 
 
 @pytest.mark.real_data

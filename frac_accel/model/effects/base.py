@@ -147,6 +147,19 @@ class Effect:
         """
         return [field.name for field in parameter_fields(cls) if is_varied(field)]
 
+    @classmethod
+    def of_turn(cls, rotation, beside=None):
+        """The effect that says that the sensor lies turned, or None.
+
+        Parameters
+        ----------
+        rotation : ndarray, shape (3, 3)
+            From the reference's axes to the sensor's.
+        beside : Effect, optional
+            One of this cause that acts before.
+        """
+        return None
+
     def alternatives(self):
         """Effects of this cause to go on from that differ in what no fit varies, such as an order.
 

@@ -13,6 +13,8 @@ from .fit_starts import finite
 _AXES = "xyz"
 # Share of an axis that counts as the whole, for words.
 _WHOLE = 0.97
+# Cosine of the pitch below which roll and yaw turn about the same axis.
+_UPRIGHT = 0.02
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,6 +47,21 @@ class Misalignment(Effect):
             # frozen: said once, of this turn
             object.__setattr__(self, "explanation", f"{type(self).explanation[:-1]}: "
                                f"{', '.join(words)}.")
+
+    @classmethod
+    def of_turn(cls, rotation, beside=None):
+        """Angles of a rotation; None of a mirrored sensor. Where x and z turn about the same axis
+        (a pitch of a quarter turn), the roll is 0."""
+        if np.linalg.det(rotation) < 0:
+            return None
+        turn = (beside or cls()).rotation @ rotation.T
+        upright = np.hypot(turn[0, 0], turn[1, 0])
+        pitch = np.arctan2(-turn[2, 0], upright)
+        if upright < _UPRIGHT:
+            roll, yaw = 0.0, np.arctan2(-turn[0, 1], turn[1, 1])
+        else:
+            roll, yaw = np.arctan2(turn[2, 1], turn[2, 2]), np.arctan2(turn[1, 0], turn[0, 0])
+        return cls(*(float(angle) for angle in np.degrees([roll, pitch, yaw])))
 
     @property
     def rotation(self):

@@ -1,0 +1,61 @@
+"""The turn of a sensor that lies turned, among what was found in the reference's axes."""
+
+import dataclasses
+
+import numpy as np
+
+from ..model import AXES, AxisModel, SensorModel
+from ..model.effects import known_effects
+from ..model.parameters import parameter_fields
+from .engine import held_out
+from .finding import Finding
+from .gain import certainty, gain
+from .words import gain_words
+
+# What a turn makes of a verdict on the signal that was turned back.
+_WITH_TURN = {"consistent": "explained", "unexplained": "partly_explained"}
+
+
+def with_turn(judged, engine, orientation):
+    """A diagnosis of the turned signal, with its turn as a finding and in the extended model.
+
+    Parameters
+    ----------
+    judged : Diagnosis
+    engine : Engine
+    orientation : Orientation
+
+    Returns
+    -------
+    Diagnosis
+        The one given where no cause says this turn, as of a mirrored sensor.
+    """
+    axis, turned = engine.problem.axis, engine.record.sensor
+    own = {effect.cause: effect for effect in judged.model.axis(AXES[axis]).effects}
+    turns = [cls.of_turn(orientation.rotation, own.get(cause))
+             for cause, cls in known_effects().items()]
+    effect = next((turn for turn in turns if turn is not None), None)
+    if effect is None:
+        return judged
+    after = engine.problem.errors(engine.search.baseline)
+    before = after + (turned @ orientation.rotation.T - turned)[:, axis]
+    rows = engine.wanted & np.isfinite(after) & held_out(engine.record.reference[:, axis])
+    g = gain(before[rows], after[rows])
+    finding = Finding(
+        effect, dict.fromkeys((field.name for field in parameter_fields(type(effect))),
+                              orientation.angle_std_deg),
+        certainty(g), [], [orientation.words, *gain_words(effect.cause, g, np.inf, [])], g)
+    return dataclasses.replace(
+        judged, verdict=_WITH_TURN.get(judged.verdict, judged.verdict),
+        reason=f"turned into the reference's axes, {judged.reason}",
+        findings=[*(f for f in judged.findings if f.cause != effect.cause), finding],
+        model=_turned_model(judged.model, effect))
+
+
+def _turned_model(model, effect):
+    axes = {}
+    for name in AXES:
+        own = model.axis(name)
+        axes[name] = AxisModel(own.core, (*(e for e in own.effects if e.cause != effect.cause),
+                                          effect))
+    return SensorModel(model.core, model.effects, axes, model.metadata, model.reference_faults)
