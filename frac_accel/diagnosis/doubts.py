@@ -56,9 +56,11 @@ def doubts_about(engine, best, gains, stds, left, noise):
         rms = min(takes[cause], engine.rms(added[cause]))
         # where it was judged: what comes and goes may do less elsewhere
         there = float(np.sqrt(np.mean(added[cause][engine.held_out_rows]**2)))
-        if max(rms, there) < _BY_ITSELF * takes[cause]:
+        # of the whole record: what was learnt may go astray where it is held out
+        gained = min(takes[cause], engine.takes(best, cause))
+        if max(rms, there) < _BY_ITSELF * gained:
             doubts.setdefault(cause, f"it changes the output by {there:.3g} RMS only: the rest of "
-                                     f"what it explains ({takes[cause]:.3g} RMS) is a free motion "
+                                     f"what it explains ({gained:.3g} RMS) is a free motion "
                                      "of its own")
         # noise makes nothing that changes with time
         if rms < AS_NOISE * own and not best.effects[cause].shows_with_time:

@@ -246,6 +246,12 @@ class Engine:
         # what was found beside the unwanted has met its rivals beside them only
         return self.compete(found, unwanted)
 
+    def everyday(self):
+        """The smallest set of everyday causes."""
+        search = self.search
+        begin = search.everyday(search.baseline)
+        return search.prune(search.fit({**search.base, **begin}), self.threshold)
+
     def _beside_base(self, effects):
         """Those of some effects that are not in every fit."""
         return {cause: effect for cause, effect in effects.items()
@@ -482,6 +488,11 @@ class Engine:
             return p.clear(best.simulated - p.simulate(less), best.free)
         except FracAccelError:
             return p.clear(best.simulated, best.free)
+
+    def takes(self, best, cause):
+        """RMS that a fit of all samples leaves less with a cause than without it."""
+        less = self.search.without(best, cause)
+        return float(np.sqrt(max(less.cost - best.cost, 0.0) / self.problem.count))
 
     def odd_share(self, best, cause):
         """Share of the power that a cause adds which turns its sign with the motion."""

@@ -9,6 +9,8 @@ from .stretches import strongest_part
 # Links that are fitted, and the share of an oscillator's residual power that one may leave.
 _FITTED = 6
 _FAR_LESS = 0.1
+# Damping ratio from which an oscillator is two lags.
+_OVERDAMPED = 1.0
 # Variances of the noise within which a gain with one link describes a record as well.
 _AS_WELL = 10.0
 
@@ -51,9 +53,11 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
     fits = engine.search.fit_all([
         engine.search.begun(start, cause, begin)
         for _, cause, begin in engine.search.screen(start)[:_FITTED]], start.cost)
-    # as well with fewer parameters is better: an oscillator that is damped beyond all is a lag
+    # as well with fewer parameters is better
     as_well = (1 + _AS_WELL / own.problem.count) * before.cost
-    found = next((fit for fit in fits if fit.cost <= _FAR_LESS * before.cost
+    # without a resonance two lags are no oscillator: what else says as much is as likely
+    enough = _FAR_LESS if model.axes[column].core.damping_ratio < _OVERDAMPED else 1.0
+    found = next((fit for fit in fits if fit.cost <= enough * before.cost
                   or (fit.size < before.size and fit.cost <= as_well)), None)
     if found is None:
         return None

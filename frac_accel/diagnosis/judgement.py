@@ -138,6 +138,14 @@ def _settled(engine, best, noise_std, known=None):
             break
         dropped.update({cause: here.doubts[cause] for cause in unwanted})
         here = there
+    if here.doubts and here.doubts.keys() >= here.gains.keys():
+        # an offset is one whatever else is not understood
+        there = _examined(engine, engine.everyday(), noise_std, known)
+        named = there.gains.keys() - there.doubts.keys()
+        if named:
+            dropped.update({cause: words for cause, words in here.doubts.items()
+                            if cause not in there.gains})
+            here = there
     return here, dropped
 
 

@@ -307,7 +307,7 @@ class Search:
         self.stages.enter_round("looking at all causes", SEARCHED)
         seeds = [{}, seed or {}]
         if not done(bare):
-            seeds.append(self._everyday(bare))
+            seeds.append(self.everyday(bare))
         return self.prune(self.grow([begin for i, begin in enumerate(seeds) if begin or not i],
                                     threshold, promises, done, _MOST), threshold)
 
@@ -338,7 +338,7 @@ class Search:
                 break
         return best
 
-    def _everyday(self, fitted):
+    def everyday(self, fitted):
         """Causes that are common and cheap, each from its best start.
 
         What is odd must win beside them, lest it be taken for what they would have explained.
