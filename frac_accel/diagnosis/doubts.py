@@ -34,6 +34,8 @@ _SLOW_PARTS, _SLOW_SHARE, _SLOW_TIMES = 20, 0.5, 6.0
 # Share of what a cause takes (RMS) that it must change the output by: else its free motion does
 # that.
 _BY_ITSELF = 0.5
+# Share of what a filter takes (RMS) below which a delay beside it may only mend it.
+_MENDS = 0.1
 # Filters that may be one of higher order: so many, or two with poles within such a factor.
 _SEVERAL, _NEAR = 3, 4.0
 # Times the power that is left by a set with filters which a set without them, and without a link of
@@ -43,6 +45,10 @@ _AS_WELL = 1.5
 _ACAUSAL = 3.0
 _MORE = ("a linear filter would take another {:.0%} of what is left: the linear causes only "
          "imitate the true response")
+# Share of what is left that changes with time from which filters may be a mean of what moves.
+_VARYING = 0.5
+_MOVING = ("{:.0%} of what is left changes with time: the linear causes may be the mean of what "
+           "moves")
 
 
 def doubts_about(engine, best, gains, stds, left, noise):
@@ -86,7 +92,8 @@ def doubts_about(engine, best, gains, stds, left, noise):
         for cause, other in (pair, pair[::-1]):
             doubts.setdefault(cause, f"it nearly cancels {other}: together they may stand for "
                                      "one cause that is not known")
-    for cause, words in _parts_of_a_law(best, takes, added, left).items():
+    for cause, words in {**_parts_of_a_law(best, takes, added, left),
+                         **_corrections(engine, best, takes)}.items():
         doubts.setdefault(cause, words)
     spread = float(np.std(p.measured[p.used]))
     if gains and (left.share > 0 or not is_accounted(engine.rms(best.residual), spread, noise)):
@@ -153,6 +160,12 @@ def _imitators(engine, best, takes, left):
     """Linear causes beside which a filter would take still more: they imitate something else."""
     share = _linear_share(engine, best)
     filters = _filters(engine, best)
+    varying = sum(share for share, part in engine.structure(best) if part == "time_varying")
+    if varying > _VARYING and not share:
+        # the mean of a delay or gain that moves is a filter, too
+        share, more = varying, _MOVING
+    else:
+        more = _MORE
     if not share or not filters:
         return {}
     rest = math.sqrt(share) * left.rms
@@ -162,7 +175,7 @@ def _imitators(engine, best, takes, left):
         return {}
     linear = [cause for cause, effect in best.effects.items()
               if cause in takes and (cause in filters or effect.is_constant)]
-    return dict.fromkeys(linear, _MORE.format(share))
+    return dict.fromkeys(linear, more.format(share))
 
 
 def resembles(engine, fitted, effect, taken):
@@ -208,6 +221,19 @@ def _parts_of_a_law(best, takes, added, left):
                          "of the force")
                 found |= {shift: words, law: words}
     return found
+
+
+def _corrections(engine, best, takes):
+    """Delays and shifts of the core that take less than what is left, and little beside a filter:
+    they may only mend what that lacks."""
+    filters = _filters(engine, best)
+    large = {cause: takes[cause] for cause in filters if cause in takes}
+    cause = max(large, key=large.get, default=None)
+    most = min(_MENDS * large.get(cause, 0.0), engine.rms(best.residual))
+    return {small: f"it takes {takes[small]:.3g} RMS only beside {cause} ({takes[cause]:.3g} RMS): "
+                   "it may mend what that lacks"
+            for small in large if takes[small] < most
+            and (filters[small].pure_delay_s() or filters[small].restates_core)}
 
 
 def _one_filter(engine, best):

@@ -409,7 +409,9 @@ class Engine:
 
     def learnt(self, fitted):
         """The same causes, fitted to the learning part of the record only, beside all that the
-        model in use leaves open as the whole record has it."""
+        model in use leaves open as the whole record has it; with all parameters held, as it is."""
+        if not fitted.unknowns:
+            return fitted
         if fitted.causes not in self._learnt:
             self._learnt[fitted.causes] = self._learnt_of(fitted)
         return self._learnt[fitted.causes]

@@ -42,6 +42,8 @@ _STEADY = 0.2
 _CLEAR = 10.0
 # Where nothing shows that what is left is noise, share of its power by which it must beat it.
 _NEARLY = 0.05
+# Share of what the largest cause takes (RMS) that a common one must take to be named for that.
+_COMMON = 0.1
 # Standard uncertainties from the model's own value by which a parameter has moved.
 _MOVED = 5.0
 
@@ -76,11 +78,12 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
     settled, more = _settled(engine, best, noise_std, known)
     best, gains, left, noise, stds, doubts = settled
     doubted |= more
-    findings = []
+    findings, tied = [], set()
     p = engine.problem
     clear = _CLEAR if is_accounted(engine.rms(best.residual), float(np.std(p.measured[p.used])),
                                    noise) else max(_CLEAR, _NEARLY * p.count)
     suspects = [_suspect({cause}, 0.0, words) for cause, words in doubted.items()]
+    most = max((g.taken for g in gains.values()), default=0.0)
     for cause, g in gains.items():
         mirror = best.effects[cause].mirrors
         rivals = [(margin, causes) for margin, causes in engine.rivals(best, cause)
@@ -93,13 +96,15 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
                         gain_words(cause, g, margin, instead), g)
         if cause in doubts:
             suspects.append(_suspect({cause}, 0.0, doubts[cause]))
-        elif margin > clear or (best.effects[cause].everyday and instead and not any(
-                effect_of(name).everyday for name in instead)):
-            # of two that say the same, what is common
+        elif margin > clear or (
+                best.effects[cause].everyday and instead and g.taken > _COMMON * most
+                and not any(effect_of(name).everyday for name in instead)):
+            # of two that say the same, what is common; not what may only mend what another lacks
             findings.append(entry)
         else:
             suspects.append(_suspect({cause, *instead}, margin, "another cause explains as much"))
-    return _verdict(engine, best, left, findings, suspects, found, noise,
+            tied.add(cause)
+    return _verdict(engine, best, left, findings, suspects, tied, found, noise,
                     lambda fitted: read_off(engine, fitted, found, shown, sensor))
 
 
@@ -210,9 +215,9 @@ def _suspect(causes, margin, reason):
             "experiment": separating_experiment(causes)}
 
 
-def _verdict(engine, best, left, findings, suspects, found, noise, shown_by):
+def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_by):
     fraction = _remaining(engine, best, left.noise_rms) if left.share > 0 else 0.0
-    findings, fitted, stds, more = _sure(engine, best, findings, left, fraction)
+    findings, fitted, stds, more = _sure(engine, best, findings, tied, left, fraction)
     suspects += more
     complete = fitted.causes == best.causes
     if not complete:
@@ -257,7 +262,7 @@ def _remaining(engine, fitted, noise_rms):
     return max(fitted.cost / count - noise_rms**2, 0.0) / excess if excess > 0 else 0.0
 
 
-def _sure(engine, best, findings, left, fraction):
+def _sure(engine, best, findings, tied, left, fraction):
     """The findings that stand where something is left; the model of these alone, with its
     uncertainties; and the others as suspects."""
     doubtful = set()
@@ -265,7 +270,7 @@ def _sure(engine, best, findings, left, fraction):
         # something is left, which the causes may have been bent by, or mistaken for
         doubtful = {f.cause for f in findings if f.cause in best.effects
                     and (fraction > _LEFT or engine.unsteadiness(best, f.cause) > _STEADY)}
-    fitted, stds, dropped = _refitted(engine, best, {f.cause for f in findings} - doubtful)
+    fitted, stds, dropped = _refitted(engine, best, {f.cause for f in findings} - doubtful, tied)
     findings = [f for f in findings if f.cause not in doubtful and f.cause not in dropped]
     if fitted.causes != best.causes:
         findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
@@ -312,13 +317,18 @@ def _account(engine, fitted, findings, noise):
                    accounted and not is_covered(everywhere))
 
 
-def _refitted(engine, best, named):
+def _refitted(engine, best, named, tied):
     """The causes that are named, fitted without the others; their uncertainties; and, in words,
     those that are no longer to be named then.
 
-    What is not named is not in the model.
+    What is not named is not in the model. Where the others are `tied` with rivals only, the named
+    ones stay as they are beside these: with neither, they would be bent.
     """
     base, named, dropped = engine.search.base.keys(), named & best.effects.keys(), {}
+    missing = best.causes - base - named
+    if named and missing and missing <= tied:
+        kept = {c: e for c, e in best.effects.items() if c not in missing}
+        return engine.problem.fit(kept, held=kept), engine.uncertainties(best), {}
     fitted, stds = best, engine.uncertainties(best)
     while True:
         if named != fitted.causes - base:

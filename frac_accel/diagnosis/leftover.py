@@ -30,6 +30,8 @@ SCATTER = 1.2
 _HALVINGS = 12
 # Standard deviations of the statistic under independence by which a residual is no noise.
 _SIGNIFICANT = 6.0
+# Share that must grow with the signal, so that noise with a long memory is not taken for it.
+_LEAST_GROWN = 0.05
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,9 +59,9 @@ class Leftover:
     @property
     def share(self):
         """Share of the residual's power that is not noise; 0 where neither is significant."""
-        shares = [share for share, score in ((self.linear, self.linear_score),
-                                             (self.level, self.level_score))
-                  if score > _SIGNIFICANT]
+        shares = [share for share, score, least in (
+            (self.linear, self.linear_score, 0.0), (self.level, self.level_score, _LEAST_GROWN))
+            if score > _SIGNIFICANT and share > least]
         return max(shares, default=0.0)
 
     @property
