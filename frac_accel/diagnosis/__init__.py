@@ -155,11 +155,12 @@ def _in_axes_of_reference(record, source, axis, temperature, model):
     orientation = Orientation.of(record)
     if orientation is None:
         return record, source, None, []
-    if model and orientation.opposes(axis, -1 if _inverts(model.axis(axis)) else 1):
+    opposes = orientation.opposes(axis, -1 if model and _inverts(model.axis(axis)) else 1)
+    if model and opposes and not orientation.upside_down:
         return record, source, None, [
             f"the sensor's {axis} axis points the other way than the model says, or its polarity "
             "is reversed: a gain below zero says that"]
-    if not orientation.astray(axis):
+    if not (orientation.astray(axis) or (opposes and orientation.upside_down)):
         return record, source, None, []
     try:
         source = source[0], orientation.turn(source[1])

@@ -78,7 +78,7 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
     settled, more = _settled(engine, best, noise_std, known)
     best, gains, left, noise, stds, doubts = settled
     doubted |= more
-    findings, tied = [], set()
+    findings, tied = [], {}
     p = engine.problem
     clear = _CLEAR if is_accounted(engine.rms(best.residual), float(np.std(p.measured[p.used])),
                                    noise) else max(_CLEAR, _NEARLY * p.count)
@@ -103,7 +103,7 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
             findings.append(entry)
         else:
             suspects.append(_suspect({cause, *instead}, margin, "another cause explains as much"))
-            tied.add(cause)
+            tied[cause] = other
     return _verdict(engine, best, left, findings, suspects, tied, found, noise,
                     lambda fitted: read_off(engine, fitted, found, shown, sensor))
 
@@ -321,15 +321,17 @@ def _refitted(engine, best, named, tied):
     """The causes that are named, fitted without the others; their uncertainties; and, in words,
     those that are no longer to be named then.
 
-    What is not named is not in the model. Where the others are `tied` with rivals only, the named
-    ones stay as they are beside these: with neither, they would be bent.
+    What is not named is not in the model. Where the others are only `tied` with rivals (sets by
+    cause) in which the named ones are the same, these stay as they are: with neither, they would
+    be bent.
     """
     base, named, dropped = engine.search.base.keys(), named & best.effects.keys(), {}
-    missing = best.causes - base - named
-    if named and missing and missing <= tied:
-        kept = {c: e for c, e in best.effects.items() if c not in missing}
-        return engine.problem.fit(kept, held=kept), engine.uncertainties(best), {}
     fitted, stds = best, engine.uncertainties(best)
+    missing = best.causes - base - named
+    if named and missing and missing <= tied.keys() and all(
+            engine.agrees(best, stds, named, tied[cause]) for cause in missing):
+        kept = {c: e for c, e in best.effects.items() if c not in missing}
+        return engine.problem.fit(kept, held=kept), stds, {}
     while True:
         if named != fitted.causes - base:
             fitted = engine.search.to_its_best(engine.search.fit(

@@ -372,6 +372,10 @@ class Search:
                 # a motion without bound: the best that is known of even fewer
                 found = min((fit for fit in self.fits.values() if fit.causes <= frozenset(less)),
                             key=lambda fit: fit.cost)
+        if goal < found.cost and fitted.effects[cause].pure_delay_s() \
+                and not any(map(acts_on_spring, less.values())):
+            # a filter of another order has another delay
+            found = self.varied(found)
         return found
 
 

@@ -121,6 +121,11 @@ class Orientation:
         with a `sign` of 1 or -1."""
         return self.followed(axis) == ("" if sign < 0 else "-") + axis
 
+    @property
+    def upside_down(self):
+        """Whether two axes that move are reversed, as half a turn about the third reverses them."""
+        return not self.mirrored and int(np.sum(np.diag(self.nearest)[self.moving] < 0)) == 2
+
     def turn(self, samples):
         """Samples of the sensor in the reference's axes.
 
