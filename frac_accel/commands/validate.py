@@ -98,6 +98,8 @@ def table(result, axis):
                          f"{100 * band.amplitude_error:14.3f} {band.phase_error_deg:12.3f} "
                          f"{100 * band.peak_error:10.3f}")
         lines.append(f"  median relative error {metrics.median_relative_error_percent:.3f} %")
+        if metrics is result.simulation:
+            lines.append(f"  at all frequencies: NRMSE {100 * result.whole_nrmse:.3f} %")
     filters, design = result.filters, result.filters["axes"][axis]
     low, high = design["band_hz"]
     lines.append(f"filter: {low:.4g} to {high:.4g} Hz, delay {filters['filter_delay_s']:.4g} s "

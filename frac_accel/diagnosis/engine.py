@@ -98,6 +98,8 @@ class Engine:
         self._step = step
         # the record, and its samples that may count: of a very long one, more than are fitted
         self.record, self.wanted = record, used
+        # common causes by name that were identified with the model in use
+        self.identified = {}
         self.search = Search(self.problem, base, candidates, stages)
         # `Open` by cause: what is known of the parameters that are free in every fit
         self.loose = loose or {}

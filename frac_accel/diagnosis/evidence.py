@@ -105,18 +105,17 @@ class Evidence:
     by_time: dict
 
     @classmethod
-    def of(cls, engine, best, named):
+    def of(cls, engine, best, fitted, named):
         """Evidence for the causes that are named.
 
         Parameters
         ----------
         engine : Engine
-        best : Fitted
+        best, fitted : Fitted
+            The best set of causes, and that of the extended model.
         named : dict of str to Effect
         """
         search, p = engine.search, engine.problem
-        fitted = search.fit({cause: effect for cause, effect in best.effects.items()
-                             if cause in named or cause in search.base})
         outputs, residuals = _compared(engine, fitted, named)
         measured = np.where(p.record.valid, p.measured, np.nan)
         rows, record = engine.held_out_rows, p.record
@@ -187,7 +186,7 @@ def _compared(engine, fitted, named):
     """Outputs and residuals (NaN where a sample does not count) by model."""
     p, bare = engine.problem, engine.search.baseline
     outputs, residuals = {IN_USE: bare.output}, {IN_USE: bare.residual}
-    if named:
+    if named or fitted.causes != bare.causes:
         output = fitted.output
         for effect in named.values():
             # read off the record, and not among those that were fitted

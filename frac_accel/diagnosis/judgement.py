@@ -219,6 +219,7 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
     fraction = _remaining(engine, best, left.noise_rms) if left.share > 0 else 0.0
     findings, fitted, stds, more = _sure(engine, best, findings, tied, left, fraction)
     suspects += more
+    unnamed = sorted(fitted.causes - {f.cause for f in findings} - engine.search.base.keys())
     complete = fitted.causes == best.causes
     if not complete:
         fraction = _remaining(engine, fitted, left.noise_rms)
@@ -239,17 +240,19 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
     described, after = _described(engine, fitted, account.after, {part for _, part in strange}) \
         if verdict in _INCOMPLETE or strange else ({}, account.after)
     named = {f.cause: f.effect for f in findings}
-    model = _extended(engine, {**fitted.effects, **named, **{e.cause: e for e in described}})
+    model = _extended(engine, {**fitted.effects, **named, **{e.cause: e for e in described}},
+                      after)
     p, spread = engine.problem, account.spread
     return Diagnosis(
         verdict, reason_of(verdict, account.error / spread, noise, account.accounted, strange)
-        + set_aside(engine.aside, engine.record.valid) + description_words([*described.values()])
+        + set_aside(engine.aside, engine.record.valid)
+        + description_words([*described.values()], unnamed)
         + hidden_words(account.own, account.error),
         {"rmse": account.before, "nrmse": account.before / spread, "noise_rms": left.noise_rms},
         findings, suspects,
         {"rmse": after, "nrmse": after / spread},
         float(min(fraction, 1.0)), model, found,
-        Evidence.of(engine, best, named),
+        Evidence.of(engine, best, fitted, named),
         noise.as_dict(), p.limit.summary(),
         [*engine.budget(engine.search.baseline).as_list("baseline"),
          *engine.budget(fitted).as_list("extended")])
@@ -272,6 +275,7 @@ def _sure(engine, best, findings, tied, left, fraction):
                     and (fraction > _LEFT or engine.unsteadiness(best, f.cause) > _STEADY)}
     fitted, stds, dropped = _refitted(engine, best, {f.cause for f in findings} - doubtful, tied)
     findings = [f for f in findings if f.cause not in doubtful and f.cause not in dropped]
+    fitted, stds = _with_identified(engine, fitted, stds)
     if fitted.causes != best.causes:
         findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
                     if f.cause in fitted.effects else f for f in findings]
@@ -315,6 +319,22 @@ def _account(engine, fitted, findings, noise):
     accounted = is_covered(min([error, *by_itself]))
     return Account(spread, before, after, error, own, accounted,
                    accounted and not is_covered(everywhere))
+
+
+def _with_identified(engine, fitted, stds):
+    """A fit with what was identified beside the core, where that predicts held-out data better,
+    named or not; and its uncertainties. What is named is not bent by it: then only beside what is
+    as common."""
+    p, more = engine.problem, {cause: effect for cause, effect in engine.identified.items()
+                               if cause not in fitted.effects}
+    odd = [cause for cause in fitted.causes - engine.search.base.keys()
+           if not fitted.effects[cause].everyday]
+    if odd or not more:
+        return fitted, stds
+    wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
+    better = gain(*((p.measured - engine.learnt(fit).output)[engine.held_out_rows]
+                    for fit in (fitted, wider)))
+    return (wider, engine.uncertainties(wider)) if better.is_relevant else (fitted, stds)
 
 
 def _refitted(engine, best, named, tied):
@@ -375,8 +395,9 @@ def _described(engine, fitted, after, parts):
     return described, after
 
 
-def _extended(engine, effects):
-    """The model in use with these causes on the diagnosed axis."""
+def _extended(engine, effects, noise_std):
+    """The model in use with these causes on the diagnosed axis, and what they leave as its noise
+    where it states none."""
     p = engine.problem
     own = p.axis_model(effects)
     common = {cause: effect for cause, effect in effects.items() if effect.common_to_axes}
@@ -384,7 +405,8 @@ def _extended(engine, effects):
     axes[AXES[p.axis]] = own
     axes = {name: AxisModel(axis.core, tuple(e for e in axis.effects if not e.of_reference))
             for name, axis in axes.items()}
-    return SensorModel(p.baseline.core, p.baseline.effects, axes, p.baseline.metadata,
+    return SensorModel(p.baseline.core, p.baseline.effects, axes,
+                       {"noise_std": float(noise_std), **p.baseline.metadata},
                        [effect for effect in own.effects if effect.of_reference])
 
 

@@ -60,10 +60,17 @@ def set_aside(aside, valid):
            "spikes there" if aside.any() else ""
 
 
-def description_words(described):
-    """Words for what the extended model holds beside causes."""
-    return (f"; the extended model has {' and '.join(described)}, which describes a part of it and "
-            "names nothing") if described else ""
+def description_words(described, unnamed):
+    """Words for what the extended model holds beside named causes: fitted curves, and causes that
+    were identified with it."""
+    words = ""
+    if described:
+        words = f"; the extended model has {' and '.join(described)}, which describes a part of " \
+                "it and names nothing"
+    if unnamed:
+        words += f"; {' and '.join(unnamed)} stay in the extended model as identified, without a " \
+                 "name"
+    return words
 
 
 def hidden_words(own, error):

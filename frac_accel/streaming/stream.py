@@ -600,12 +600,13 @@ class Stream:
                                   for field in dataclasses.fields(Filtered)))
             codes, rows = codes[~rows], rows[~rows]
         self._totals["distrusted"] += int(rows.sum())
-        is_faulty = codes > 0
-        rows = is_faulty.any(axis=1)
-        # a message cannot say that one axis is bad and another's noise unknown
-        unknown = rows[:, None] & np.isnan(filtered.variance)
-        return dataclasses.replace(filtered, variance=np.where(is_faulty | unknown, DISTRUSTED,
-                                                               filtered.variance))
+        is_faulty, unknown = codes > 0, np.isnan(filtered.variance)
+        # a message cannot say that one axis is bad and another's noise unknown: one that is only
+        # not connected takes nothing from the others
+        harmless = ~rows & (unknown & ~is_faulty).any(axis=1)
+        bad = np.where(rows[:, None], is_faulty | unknown, is_faulty & ~harmless[:, None])
+        variance = np.where(harmless[:, None] & is_faulty, np.nan, filtered.variance)
+        return dataclasses.replace(filtered, variance=np.where(bad, DISTRUSTED, variance))
 
 
 def _range_of(plausible_range):

@@ -64,6 +64,9 @@ class Validation(Shown):
         Fate of the samples.
     words : tuple of str
         What was done to put reference and sensor together: rates, band, offset of the clocks.
+    whole_nrmse : float
+        RMS of simulated less measured output over the measured one's standard deviation, at all
+        frequencies.
     """
 
     simulation: ErrorMetrics
@@ -71,6 +74,7 @@ class Validation(Shown):
     filters: dict
     counters: dict
     words: tuple = ()
+    whole_nrmse: float = float("nan")
 
     def __repr__(self):
         return (f"<Validation: simulation {self.simulation.total.nrmse:.3%}, correction "
@@ -91,7 +95,7 @@ class Validation(Shown):
 
     def as_dict(self):
         """Plain numbers, without the compared signals."""
-        return {"simulation": self.simulation.as_dict(),
+        return {"simulation": self.simulation.as_dict(), "whole_nrmse": self.whole_nrmse,
                 **{name: getattr(self.comparison, name).as_dict()
                    for name in ("raw", "scaled", "corrected")},
                 "filters": self.filters, "counters": self.counters, "words": list(self.words)}
@@ -152,7 +156,8 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     return Validation(
         simulation=error_metrics(measured, simulated, pair.sampling_rate_hz, bands),
         comparison=comparison, filters=corrector.design.summary(), counters=corrector.counters,
-        words=pair.words)
+        words=pair.words,
+        whole_nrmse=float(np.sqrt(np.mean((measured - simulated)**2)) / np.std(measured)))
 
 
 def compare(reference, sensor, corrected, design, axis="x"):
@@ -236,14 +241,19 @@ def _simulated(model, pair, column, temperature_at):
     if temperature_at is not None:
         seconds = pair.taken_out_s + np.arange(len(pair)) / pair.sampling_rate_hz
         temperature = temperature_at(pair.start_ns + 1e9 * seconds)
-    simulated = simulate(model, pair.reference, pair.sampling_rate_hz, initial="steady",
-                         temperature_c=temperature)
     at = np.arange(len(pair)) / pair.sampling_rate_hz
     instants = np.round(1e9 * at).astype(np.int64)
-    shifted = interpolate(instants, simulated, instants + round(1e9 * pair.lag_s),
-                          pair.sampling_rate_hz)[:, column]
-    run = _longest_run(np.isfinite(shifted) & pair.valid, instants, pair.sampling_rate_hz)
-    return pair.sensor[run, column], shifted[run]
+
+    def begun(initial):
+        simulated = simulate(model, pair.reference, pair.sampling_rate_hz, initial=initial,
+                             temperature_c=temperature)
+        shifted = interpolate(instants, simulated, instants + round(1e9 * pair.lag_s),
+                              pair.sampling_rate_hz)[:, column]
+        run = _longest_run(np.isfinite(shifted) & pair.valid, instants, pair.sampling_rate_hz)
+        return pair.sensor[run, column], shifted[run]
+    # how it moved before the record is not known: a free mass does not move on by itself
+    return min((begun(initial) for initial in ("steady", "rest")),
+               key=lambda both: np.mean(np.square(both[0] - both[1])))
 
 
 def _longest_run(good, stamps_ns, rate):
