@@ -140,6 +140,9 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
     engine.aside = stray | (record.valid & ~moving)
+    if seed is not None:
+        engine.in_own_core = [cause for cause, entry in loose.items()
+                              if entry.effect.restates_core]
     engine.identified = {cause: effect for cause, effect in (seed or {}).items() if effect.everyday}
     _require_relation(engine, axis, seed)
     best = engine.run(seed)

@@ -100,6 +100,8 @@ class Engine:
         self.record, self.wanted = record, used
         # common causes by name that were identified with the model in use
         self.identified = {}
+        # causes that say what a core is that was identified with them
+        self.in_own_core = ()
         self.search = Search(self.problem, base, candidates, stages)
         # `Open` by cause: what is known of the parameters that are free in every fit
         self.loose = loose or {}

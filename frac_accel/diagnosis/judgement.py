@@ -17,6 +17,7 @@ from .evidence import Evidence
 from .experiments import separating_experiment
 from .finding import Diagnosis, Finding
 from .gain import gain
+from .own_core import in_own_core
 from .read_off import read_off
 from .words import (
     description_words,
@@ -242,6 +243,8 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
     named = {f.cause: f.effect for f in findings}
     model = _extended(engine, {**fitted.effects, **named, **{e.cause: e for e in described}},
                       after)
+    if engine.in_own_core:
+        model, findings = in_own_core(model, findings, engine.in_own_core, AXES[engine.problem.axis])
     p, spread = engine.problem, account.spread
     return Diagnosis(
         verdict, reason_of(verdict, account.error / spread, noise, account.accounted, strange)

@@ -8,6 +8,8 @@ import numpy as np
 
 from ..errors import ModelError
 
+_OUTPUT = "output units"
+
 
 def parameter(unit, *, above=None, minimum=None, below=None, maximum=None, default=None,
               null=None, scale=None, reach=None, step=None, whole=False, jumps=False):
@@ -115,6 +117,21 @@ def parameter_fields(cls):
 def unit_of(cls, name):
     """Unit of one parameter of `cls`."""
     return next(f.metadata["unit"] for f in parameter_fields(cls) if f.name == name)
+
+
+def unit_power(unit):
+    """Power with which a parameter of this unit grows with the output: 1 for "output units/s"."""
+    below, above = unit.rpartition("/")[2], unit.partition("/")[0]
+    if _OUTPUT in below and above != unit:
+        return -2 if below.endswith("^2") else -1
+    return 1 if _OUTPUT in above else 0
+
+
+def rescaled(instance, factor):
+    """The same where the output that it acts on is so many times as large."""
+    return dataclasses.replace(instance, **{
+        field.name: getattr(instance, field.name) * factor**unit_power(field.metadata["unit"])
+        for field in parameter_fields(type(instance)) if unit_power(field.metadata["unit"])})
 
 
 def build(cls, mapping, where):

@@ -147,6 +147,10 @@ class Effect:
         """
         return [field.name for field in parameter_fields(cls) if is_varied(field)]
 
+    def restated(self, core):
+        """The core that says what this says beside another one; where `restates_core`."""
+        return self.change_core(core)
+
     @classmethod
     def of_turn(cls, rotation, beside=None):
         """The effect that says that the sensor lies turned, or None.

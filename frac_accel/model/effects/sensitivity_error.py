@@ -31,6 +31,9 @@ class SensitivityError(Effect):
             return None
         return Open(cls(1.0), {"gain": stds["sensitivity"] / abs(axis_model.core.sensitivity)})
 
+    def restated(self, core):
+        return dataclasses.replace(core, sensitivity=core.sensitivity * self.gain)
+
     def transfer_function(self, s):
         return np.full_like(s, self.gain, dtype=complex)
 

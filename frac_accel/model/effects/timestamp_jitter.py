@@ -24,12 +24,16 @@ class TimestampJitter(Effect):
         return cls(found.jitter_rms_s) if found.jitter_rms_s else None
 
     def reading(self, seen):
-        """Beside a simulation whose samples are taken at the stamps that they carry."""
+        """Beside a simulation whose samples are taken at the stamps that they carry; None of
+        batches, whose scatter is no jitter."""
+        words = next((words for words in seen.found.words if "scatter" in words), None)
+        if words is None:
+            return None
         slot, values = seen.at_stamps()
         inside = seen.used[slot]
         slot, values = slot[inside], values[inside]
         return Reading({"rms_s": self.rms_s / np.sqrt(2 * seen.found.samples)},
                        seen.measured[slot] - values, (seen.measured - seen.output)[slot],
-                       next(words for words in seen.found.words if "scatter" in words))
+                       words)
 
     rms_s: float = parameter("s", minimum=0, maximum=10, null=0.0)
