@@ -243,9 +243,9 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
     named = {f.cause: f.effect for f in findings}
     model = _extended(engine, {**fitted.effects, **named, **{e.cause: e for e in described}},
                       after)
-    if engine.in_own_core:
-        model, findings = in_own_core(model, findings, engine.in_own_core, AXES[engine.problem.axis])
     p, spread = engine.problem, account.spread
+    if engine.in_own_core:
+        model, findings = in_own_core(model, findings, engine.in_own_core, AXES[p.axis])
     return Diagnosis(
         verdict, reason_of(verdict, account.error / spread, noise, account.accounted, strange)
         + set_aside(engine.aside, engine.record.valid)
