@@ -7,6 +7,7 @@ import numpy as np
 from scipy.special import expit
 
 from ..errors import FracAccelError
+from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel
 from ..model.effects import effect_of
 from .doubts import by_what_is_left, doubts_about, left_open, resembles
@@ -242,7 +243,7 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
         if verdict in _INCOMPLETE or strange else ({}, account.after)
     named = {f.cause: f.effect for f in findings}
     model = _extended(engine, {**fitted.effects, **named, **{e.cause: e for e in described}},
-                      after)
+                      _stated(engine.problem, fitted, after / account.spread))
     p, spread = engine.problem, account.spread
     if engine.in_own_core:
         model, findings = in_own_core(model, findings, engine.in_own_core, AXES[p.axis])
@@ -259,6 +260,13 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
         noise.as_dict(), p.limit.summary(),
         [*engine.budget(engine.search.baseline).as_list("baseline"),
          *engine.budget(fitted).as_list("extended")])
+
+
+def _stated(problem, fitted, nrmse):
+    """Noise [output units] and error of the extended model, as a model file states them."""
+    noise = noise_floor(np.where(problem.used, fitted.residual, np.nan))
+    error = beyond_noise(nrmse, noise / float(np.std(problem.measured[problem.used])))
+    return {"noise_std": noise, **({"model_error": error} if error else {})}
 
 
 def _remaining(engine, fitted, noise_rms):
@@ -398,9 +406,8 @@ def _described(engine, fitted, after, parts):
     return described, after
 
 
-def _extended(engine, effects, noise_std):
-    """The model in use with these causes on the diagnosed axis, and what they leave as its noise
-    where it states none."""
+def _extended(engine, effects, stated):
+    """The model in use with these causes on the diagnosed axis, and what is stated of it."""
     p = engine.problem
     own = p.axis_model(effects)
     common = {cause: effect for cause, effect in effects.items() if effect.common_to_axes}
@@ -409,7 +416,7 @@ def _extended(engine, effects, noise_std):
     axes = {name: AxisModel(axis.core, tuple(e for e in axis.effects if not e.of_reference))
             for name, axis in axes.items()}
     return SensorModel(p.baseline.core, p.baseline.effects, axes,
-                       {"noise_std": float(noise_std), **p.baseline.metadata},
+                       {**p.baseline.metadata, **stated},
                        [effect for effect in own.effects if effect.of_reference])
 
 

@@ -12,7 +12,7 @@ from ..model.parameters import parameter_fields, plain, rebuilt, unit_of
 from ..shown import Shown, above, plain_logarithms
 from .evidence import Evidence
 from .fit.arx import ArxFit
-from .fit.uncertainty import SIGNIFICANT
+from .fit.uncertainty import SIGNIFICANT, beyond_noise, noise_floor
 from .judge.candidate import needed_order, suspicions
 from .judge.fit_validation import FitValidation, fit_validation, judge_residual
 from .judge.notes import candidate_notes
@@ -177,6 +177,8 @@ def identification(chosen, reason, datas, records, axis, provenance, agreeing=No
         notes.append(f"the delay of {fit['delay_s']:.4g} s stands in the model as one of the "
                      f"reference ({-fit['delay_s']:.4g} s): nothing is taken out of the sensor's "
                      "stamps")
+    noise_std = max(noise_floor(fit.residual), fit.noise_std)
+    model_error = beyond_noise(chosen.held_out_nrmse, noise_std / data.spread)
     effects = [delay]
     if abs(fit["offset"]) > SIGNIFICANT * parameters["offset"]["std"]:
         effects.append(identified_effect("offset", fit["offset"]))
@@ -186,7 +188,8 @@ def identification(chosen, reason, datas, records, axis, provenance, agreeing=No
         "covariance": {"parameters": list(fit.names), "matrix": fit.covariance.tolist()},
         "band_hz": list(excitation.band_hz),
         "sampling_rate_hz": rate,
-        "noise_std": fit.noise_std,
+        "noise_std": noise_std,
+        **({"model_error": model_error} if model_error else {}),
         "provenance": {"axis": axis, "structure": chosen.name, "reason": reason, **provenance},
         "validation": {"nrmse": chosen.nrmse, "held_out_nrmse": chosen.held_out_nrmse,
                        "notes": notes, **validation.essentials()},

@@ -215,6 +215,12 @@ class SensorModel:
         return float(self.metadata.get("noise_std", 0.0))
 
     @property
+    def model_error(self):
+        """RMS of what the model leaves beyond white noise, relative to the output's; 0 where not
+        known."""
+        return float(self.metadata.get("model_error", 0.0))
+
+    @property
     def plausible_range(self):
         """Lowest and highest output that can be true, or None where the model does not say."""
         pair = self.metadata.get("plausible_range")
@@ -323,8 +329,9 @@ class SensorModel:
                 raise ModelError("core: missing, expected a mapping such as {natural_frequency_hz: "
                                  "180.0, damping_ratio: 0.15}")
             core = axes["x"].core
-        if "noise_std" in data and number(data["noise_std"], "noise_std") < 0:
-            raise ModelError(f"noise_std: {data['noise_std']!s:.60} given, expected at least 0")
+        for name in ("noise_std", "model_error"):
+            if name in data and number(data[name], name) < 0:
+                raise ModelError(f"{name}: {data[name]!s:.60} given, expected at least 0")
         if "band_hz" in data:
             _require_band(data["band_hz"])
         if "plausible_range" in data:

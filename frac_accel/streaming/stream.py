@@ -20,6 +20,8 @@ from .timing import LARGEST, RATE_SAMPLES, SampleClock, tells_rate
 
 # Variance of a faulty axis [output units squared]: no fusion filter gives it any weight.
 DISTRUSTED = 1e9
+# Time [s] over which what a model leaves lasts beside the motion that it comes from.
+_LASTING_S = 10.0
 ON_FAULT = ("covariance", "drop", "report")
 # Samples kept for a change of model: the new filter starts with these behind it.
 HISTORY = 4096
@@ -42,7 +44,8 @@ class Filtered:
     values : ndarray, shape (n, 3)
     variance : ndarray, shape (n, 3)
         Their variance from the noise of the input, the uncertainty of the model's parameters,
-        bridged gaps, what is not known of the motion before the start and the filter's own error;
+        bridged gaps, what is not known of the motion before the start, the filter's own error and
+        what the model is known to leave (`model_error`);
         NaN where the noise is not known.
     """
 
@@ -512,7 +515,8 @@ class Stream:
             level = np.zeros(len(columns)) if design.band_hz[0] else columns.mean(axis=1)
             state = FilterState(design.filter, level)
             power = MotionPower(level * design.filter.static_gain, len(values))
-            power.process(state.process(columns))
+            before = state.process(columns)
+            power.process(before)
             head = np.r_[np.zeros(design.filter.lead), np.square(design.filter.impulse_head)]
             noise = FilterState(ParallelFilter(head, np.empty(0), np.empty(0)),
                                 np.zeros(len(columns)))
@@ -534,8 +538,13 @@ class Stream:
                 history.process(columns)
             ensemble = BridgeEnsemble(design.filter, len(columns))
             ensemble.process(len(values), _rows_of(bridges, rows))
-            self._states.append((rows, state, design.rms_error**2, power, noise, later, history,
-                                 static, doubt, ensemble))
+            slow = None
+            if self._model.model_error:
+                slow = MotionPower(level * design.filter.static_gain,
+                                   round(_LASTING_S * self.design.sampling_rate_hz))
+                slow.process(before)
+            self._states.append((rows, state, design.rms_error**2, power, slow, noise, later,
+                                 history, static, doubt, ensemble))
         # the oldest of the waiting will have been passed over before the first output
         skipped = len(values) - self.design.delay_samples
         fresh = self._waiting_index[:skipped]
@@ -547,14 +556,18 @@ class Stream:
         count = len(values)
         result, spread = np.empty((3, count)), np.empty((3, count))
         values, variance = np.ascontiguousarray(values.T), np.ascontiguousarray(variance.T)
-        for (rows, state, error, power, noise, later, history, static, doubt,
+        for (rows, state, error, power, slow, noise, later, history, static, doubt,
              ensemble) in self._states:
             own, known = values[rows], variance[rows]
             corrected = state.process(own)
             total = noise.process(known)
             if later:
                 total += later * known
-            total += error * power.process(corrected)
+            moving = power.process(corrected)
+            total += error * moving
+            if slow:
+                # it begins with the motion, and lasts
+                total += self._model.model_error**2 * np.maximum(moving, slow.process(corrected))
             if history:
                 added, more = history.process(own)
                 corrected += added

@@ -10,8 +10,12 @@ SIGNIFICANT = 3.0
 _REACH = 12
 # Share of a band's noise that a residual shows at least.
 _LEAST = 0.05
+# Share of a residual's power that must be no white noise for it to count as the model's error.
+_BEYOND = 0.2
 # Blocks of a record whose scatter is compared: each is longer than what a residual remembers.
 _BLOCKS = 40
+# Share of the blocks that are quiet.
+_QUIET = 0.05
 
 
 def sandwich(jacobian, residual, used):
@@ -88,6 +92,25 @@ def by_blocks(jacobian, residual):
     sums = np.add.reduceat(scaled * residual[:, None], edges)
     inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14, hermitian=True) / scale[:, None]
     return inverse @ (sums.T @ sums) @ inverse.T * count / max(count - 1, 1)
+
+
+def beyond_noise(nrmse, noise_nrmse):
+    """What a model leaves beyond white noise; all relative to the output's standard deviation.
+
+    0 where it is no more than the estimate of the noise is uncertain by.
+    """
+    beyond = nrmse**2 - noise_nrmse**2
+    return float(np.sqrt(beyond)) if beyond > _BEYOND * nrmse**2 else 0.0
+
+
+def noise_floor(residual):
+    """White part of a residual, or its RMS where the record is quietest, whichever is larger.
+
+    Noise of low frequency shows there, when no motion brings out what the model gets wrong.
+    """
+    blocks = np.array_split(np.nan_to_num(residual), _BLOCKS)
+    quiet = np.quantile([np.sqrt(np.mean(block**2)) for block in blocks if len(block)], _QUIET)
+    return max(white_noise(residual), float(quiet))
 
 
 def white_noise(residual):
