@@ -12,5 +12,5 @@ def searched(case, **options):
     with mock.patch.object(judgement.Evidence, "of", wraps=judgement.Evidence.of) as made:
         found = diagnose((reference, sensor), **{"model": case.model(), "temperature": celsius,
                                                  **options})
-    engine, best, _ = made.call_args.args
+    engine, best, _, _ = made.call_args.args
     return found, engine, best

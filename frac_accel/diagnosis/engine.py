@@ -145,6 +145,7 @@ class Engine:
             self.part = Engine(p.part(rows), p.axis, p.baseline, p.taken(self.wanted)[rows],
                                self.search.base, self.search.candidates, self.search.stages,
                                self._step, p.limit, self.passed_on, self.loose)
+            self.part.identified = self.identified
             return self.part.run(seed)
         self.best = self.compete(self.search.run(self.threshold, self.promises, self.noise_only,
                                                  seed))
@@ -253,7 +254,7 @@ class Engine:
     def everyday(self):
         """The smallest set of everyday causes."""
         search = self.search
-        begin = search.everyday(search.baseline)
+        begin = {**search.everyday(search.baseline), **self.identified}
         return search.prune(search.fit({**search.base, **begin}), self.threshold)
 
     def _beside_base(self, effects):

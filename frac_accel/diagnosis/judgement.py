@@ -145,12 +145,14 @@ def _settled(engine, best, noise_std, known=None):
             break
         dropped.update({cause: here.doubts[cause] for cause in unwanted})
         here = there
-    if here.doubts and here.doubts.keys() >= here.gains.keys():
+    if here.doubts:
+        standing = here.gains.keys() - here.doubts.keys()
+        gone = {**here.doubts, **_refitted(engine, here.best, standing, {})[2]}
         # an offset is one whatever else is not understood
-        there = _examined(engine, engine.everyday(), noise_std, known)
-        named = there.gains.keys() - there.doubts.keys()
-        if named:
-            dropped.update({cause: words for cause, words in here.doubts.items()
+        there = None if standing - gone.keys() else \
+            _examined(engine, engine.everyday(), noise_std, known)
+        if there and there.gains.keys() - there.doubts.keys():
+            dropped.update({cause: words for cause, words in gone.items()
                             if cause not in there.gains})
             here = there
     return here, dropped

@@ -44,6 +44,6 @@ def in_own_core(model, findings, restating, axis):
 
 def _std(finding, factor):
     effect = finding.effect
-    powers = {field.name: unit_power(field.metadata["unit"]) if effect.stage < GAIN else 0
+    powers = {field.name: unit_power(field) if effect.stage < GAIN else 0
               for field in parameter_fields(type(effect))}
     return {name: std * factor**powers[name] for name, std in finding.std.items()}

@@ -119,8 +119,9 @@ def unit_of(cls, name):
     return next(f.metadata["unit"] for f in parameter_fields(cls) if f.name == name)
 
 
-def unit_power(unit):
-    """Power with which a parameter of this unit grows with the output: 1 for "output units/s"."""
+def unit_power(field):
+    """Power with which a parameter grows with the output, by its unit: 1 for "output units/s"."""
+    unit = field.metadata.get("unit", "")
     below, above = unit.rpartition("/")[2], unit.partition("/")[0]
     if _OUTPUT in below and above != unit:
         return -2 if below.endswith("^2") else -1
@@ -130,8 +131,8 @@ def unit_power(unit):
 def rescaled(instance, factor):
     """The same where the output that it acts on is so many times as large."""
     return dataclasses.replace(instance, **{
-        field.name: getattr(instance, field.name) * factor**unit_power(field.metadata["unit"])
-        for field in parameter_fields(type(instance)) if unit_power(field.metadata["unit"])})
+        field.name: getattr(instance, field.name) * factor**unit_power(field)
+        for field in parameter_fields(type(instance)) if unit_power(field)})
 
 
 def build(cls, mapping, where):
