@@ -18,8 +18,8 @@ SLOW = """
 MANY_DRAWS = """
     axis_monitors backlash budget changes_in_time core_response corrected_uncertainty
     corrector_uncertainty diagnosis_data_checks diagnosis_exchanged diagnosis_laws
-    diagnosis_leftover diagnosis_noise_with_memory diagnosis_of_measured diagnosis_steps diagnosis_stretches
-    diagnosis_truthful diagnosis_unequal_rates domains_agree
+    diagnosis_leftover diagnosis_noise_with_memory diagnosis_of_measured diagnosis_steps
+    diagnosis_stretches diagnosis_truthful diagnosis_unequal_rates domains_agree
     effects_correction effects_simulation effects_streaming empirical_link further_forces
     gap_coverage identify_arx identify_auto identify_fractional identify_gain
     identify_general_equation identify_oscillator identify_records inverse_design linear_causes

@@ -77,7 +77,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
         for cause, rms in takes.items():
             like = best.effects[cause].kindred(best.residual, p.time)
             strange = math.sqrt(max(unexplained**2 - like**2, 0.0))
-            if rms < WEIGHS * strange:
+            if rms < WEIGHS * strange and not engine.stands_alone(best, cause, rms):
                 doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) does not stand out of "
                                          f"what is left unexplained ({strange:.3g} RMS)")
     if noise.rms is None and left.rms > _MOST_OF * np.std(p.measured[p.used]):
@@ -313,6 +313,8 @@ def _is_smooth(link):
 def _elsewhen(engine, best, takes, left):
     """Causes that grow with time beside which what is left still changes with it."""
     shares, found = {part: share for share, part in engine.structure(best)}, {}
+    takes = {cause: rms for cause, rms in takes.items()
+             if not engine.stands_alone(best, cause, rms)}
     for cause, taken in takes.items():
         effect = best.effects[cause]
         # an offset that wanders shows as slow, or as lines of low frequency

@@ -56,6 +56,8 @@ _PART_AT_LEAST = 0.03
 # freedom), and of slow ones where its density grows with one over the frequency (0.11 to 0.49).
 _HEAVY_TAILS, _LONG_MEMORY = 0.3, 0.5
 _OF_NOISE = {"bursts": _HEAVY_TAILS, "slow": _LONG_MEMORY}
+# Times what is left where it acts that a cause must take (RMS) to stand alone there.
+_ALONE = 10.0
 # Share of the residual's power for which a coarse lattice must account.
 _COARSE = 0.2
 # Frequencies over which a density is integrated.
@@ -407,6 +409,12 @@ class Engine:
         left = self.left(fitted)
         shares = [left.share, *(share for share, _ in self.structure(fitted))]
         return float(np.sqrt(max(shares))) * left.rms
+
+    def stands_alone(self, fitted, cause, taken):
+        """Whether what a cause takes (RMS) stands far out of what is left where it acts, whatever
+        is left elsewhere."""
+        beside = fitted.effects[cause].beside(fitted.residual, self.problem.time)
+        return beside is not None and taken > _ALONE * beside
 
     def rms(self, values):
         """RMS of values where samples count."""

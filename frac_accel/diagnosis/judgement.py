@@ -98,7 +98,7 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
                         gain_words(cause, g, margin, instead), g)
         if cause in doubts:
             suspects.append(_suspect({cause}, 0.0, doubts[cause]))
-        elif margin > clear or (
+        elif margin > clear or engine.stands_alone(best, cause, g.taken) or (
                 best.effects[cause].everyday and instead and g.taken > _COMMON * most
                 and not any(effect_of(name).everyday for name in instead)):
             # of two that say the same, what is common; not what may only mend what another lacks
@@ -285,6 +285,7 @@ def _sure(engine, best, findings, tied, left, fraction):
     if left.share > 0:
         # something is left, which the causes may have been bent by, or mistaken for
         doubtful = {f.cause for f in findings if f.cause in best.effects
+                    and not engine.stands_alone(best, f.cause, f.gain.taken)
                     and (fraction > _LEFT or engine.unsteadiness(best, f.cause) > _STEADY)}
     fitted, stds, dropped = _refitted(engine, best, {f.cause for f in findings} - doubtful, tied)
     findings = [f for f in findings if f.cause not in doubtful and f.cause not in dropped]

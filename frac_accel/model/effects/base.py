@@ -236,6 +236,18 @@ class Effect:
         """Why, with these parameters, it is not what its name says, in words; or None."""
         return None
 
+    def beside(self, residual, time_s):
+        """RMS of a residual in the place where this cause acts alone, or None where it acts at all
+        frequencies: whatever is left elsewhere, it may stand out there.
+
+        Parameters
+        ----------
+        residual : ndarray, shape (n,)
+            0 where a sample does not count.
+        time_s : ndarray, shape (n,)
+        """
+        return None
+
     def kindred(self, residual, time_s):
         """RMS [output units] of what is of its own kind in a residual, shape (n,), beside it: that
         says nothing against it."""

@@ -10,6 +10,8 @@ from .fit_starts import finite, strongest_line
 
 # A tone that wanders by less than about a third of this share of its frequency is followed.
 _RELATIVE_WIDTH = 3e-4
+# Lines on either side beside which it is seen.
+_LINES = 10
 # The highest harmonic that is taken for a part of the tone.
 _HARMONICS = 10
 
@@ -50,6 +52,13 @@ class ToneInterference(Effect):
         turns = 2j * np.pi * self.frequency_hz * time_s
         lines = [np.mean(residual * np.exp(-number * turns))
                  for number in range(2, _HARMONICS + 1)]
+        return float(np.sqrt(2) * np.linalg.norm(lines))
+
+    def beside(self, residual, time_s):
+        # the lines next to its own
+        turns = 2j * np.pi * time_s
+        apart = np.arange(-_LINES, _LINES + 1) / (time_s[-1] - time_s[0])
+        lines = [np.mean(residual * np.exp(-(self.frequency_hz + off) * turns)) for off in apart]
         return float(np.sqrt(2) * np.linalg.norm(lines))
 
     def _tone(self, circumstances):
