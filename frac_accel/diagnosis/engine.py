@@ -14,7 +14,7 @@ from ..identification.response.excitation import (
     alternating_stretches,
     learning_length,
 )
-from ..model import AxisModel
+from ..model import AxisModel, is_link
 from ..model.effects import effect_of
 from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
@@ -56,6 +56,8 @@ _PART_AT_LEAST = 0.03
 # freedom), and of slow ones where its density grows with one over the frequency (0.11 to 0.49).
 _HEAVY_TAILS, _LONG_MEMORY = 0.3, 0.5
 _OF_NOISE = {"bursts": _HEAVY_TAILS, "slow": _LONG_MEMORY}
+# Share of what is left (power) within which a common cause says the same as a filter.
+_PLAINLY = 0.02
 # Times what is left where it acts that a cause must take (RMS) to stand alone there.
 _ALONE = 10.0
 # Share of the residual's power for which a coarse lattice must account.
@@ -410,6 +412,20 @@ class Engine:
         shares = [left.share, *(share for share, _ in self.structure(fitted))]
         return float(np.sqrt(max(shares))) * left.rms
 
+    def plainer(self, best):
+        """A set in which what is common does nearly the same as a filter: where what is left is no
+        noise, it may favour either."""
+        for cause, effect in best.effects.items():
+            if effect.everyday or not is_link(effect) or cause in self.search.base:
+                continue
+            for fit in [*self.search.fits.values()]:
+                more = fit.causes - best.causes
+                if fit.cost < (1 + _PLAINLY) * best.cost and fit.size <= best.size \
+                        and best.causes - fit.causes == {cause} \
+                        and all(fit.effects[name].everyday for name in more):
+                    return fit
+        return best
+
     def stands_alone(self, fitted, cause, taken):
         """Whether what a cause takes (RMS) stands far out of what is left where it acts, whatever
         is left elsewhere."""
@@ -425,9 +441,7 @@ class Engine:
         model in use leaves open as the whole record has it; with all parameters held, as it is."""
         if not fitted.unknowns:
             return fitted
-        if fitted.causes not in self._learnt:
-            self._learnt[fitted.causes] = self._learnt_of(fitted)
-        return self._learnt[fitted.causes]
+        return _once(self._learnt, fitted, self._learnt_of)
 
     def _learnt_of(self, fitted):
         part = self.problem.restricted(self.problem.used & ~self.held_out_rows)

@@ -17,7 +17,7 @@ from .engine import WEIGHS
 from .evidence import Evidence
 from .experiments import separating_experiment
 from .finding import Diagnosis, Finding
-from .gain import gain
+from .gain import certainty, gain
 from .own_core import in_own_core
 from .read_off import read_off
 from .words import (
@@ -91,14 +91,16 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
         rivals = [(margin, causes) for margin, causes in engine.rivals(best, cause)
                   # what cannot be named does not stand in the way of what can
                   if (not mirror or mirror not in causes) and not causes & doubted.keys()]
-        margin, other = rivals[0] if rivals else (np.inf, frozenset())
+        alone = engine.stands_alone(best, cause, g.taken)
+        margin, other = (np.inf, frozenset()) if alone or not rivals else rivals[0]
         instead = sorted(other - best.causes)
-        entry = Finding(best.effects[cause], stds[cause], _confidence(margin),
+        entry = Finding(best.effects[cause], stds[cause],
+                        certainty(g) if alone else _confidence(margin * _CLEAR / clear),
                         [*(instead if margin < 10 * _CLEAR else []), *([mirror] if mirror else [])],
                         gain_words(cause, g, margin, instead), g)
         if cause in doubts:
             suspects.append(_suspect({cause}, 0.0, doubts[cause]))
-        elif margin > clear or engine.stands_alone(best, cause, g.taken) or (
+        elif margin > clear or (
                 best.effects[cause].everyday and instead and g.taken > _COMMON * most
                 and not any(effect_of(name).everyday for name in instead)):
             # of two that say the same, what is common; not what may only mend what another lacks
@@ -180,6 +182,11 @@ def _without_the_weakest(engine, here, noise_std, known):
 
 
 def _examined(engine, best, noise_std, known):
+    p = engine.problem
+    if engine.structure(best) or not is_accounted(
+            engine.rms(best.residual), float(np.std(p.measured[p.used])),
+            engine.established_noise(best, noise_std)):
+        best = engine.plainer(best)
     best, gains = _relevant(engine, _mirrored(engine, best), known)
     best = engine.search.to_its_best(best)
     left = engine.left(best)
@@ -316,11 +323,15 @@ class Account(NamedTuple):
 def _account(engine, fitted, findings, noise):
     p, rest = engine.problem, engine.held_out_rows
     spread = float(np.std(p.measured[rest]))
-    before = _rms(p.measured - engine.search.baseline.output, rest)
-    after = before if fitted.causes == engine.search.baseline.causes else _rms(
-        p.measured - engine.learnt(fitted).output, rest)
-    # what the record shows by itself, such as scattered stamps, is no part of the model
-    by_itself = [f.gain.after for f in findings if f.cause not in fitted.effects]
+    baseline = engine.search.baseline
+    before = _rms(p.measured - baseline.output, rest)
+    output = (baseline if fitted.causes == baseline.causes else engine.learnt(fitted)).output
+    # what the record shows by itself was not fitted; some of it, such as limits, is simulated
+    shown = [f for f in findings if f.cause not in fitted.effects]
+    for finding in shown:
+        output = finding.effect.simulate(output, p.simulator(p.axis).circumstances)
+    after = _rms(p.measured - output, rest)
+    by_itself = [f.gain.after for f in shown]
     own = engine.by_reference(fitted)
     # the record is all of it, not only the part that is held out
     errors = p.errors(fitted)
