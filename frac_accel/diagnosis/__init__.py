@@ -156,7 +156,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
 def _in_axes_of_reference(record, source, axis, temperature, model):
     """The record of a sensor whose axis follows another one, turned; its topics, `Orientation`
     (None where it was not turned), and words."""
-    orientation = Orientation.of(record)
+    orientation = _orientation(record, model)
     if orientation is None:
         return record, source, None, []
     opposes = orientation.opposes(axis, -1 if model and _inverts(model.axis(axis)) else 1)
@@ -174,6 +174,20 @@ def _in_axes_of_reference(record, source, axis, temperature, model):
     return turned, source, orientation, [
         f"the sensor lies turned: {orientation.words}; what follows holds for its signal turned "
         "into the reference's axes"]
+
+
+def _orientation(record, model):
+    """Orientation of a record's sensor; where it follows nothing as it is, and there is a model,
+    against what that makes of the reference: a resonance may have most of the power."""
+    found = Orientation.of(record)
+    if model is None or found is None or any(found.followed(axis) for axis in AXES):
+        return found
+    try:
+        answer = [AxisSimulator(record.reference[:, i], record.sampling_rate_hz,
+                                record.temperature_c).simulate(model.axis(i)) for i in range(3)]
+    except FracAccelError:
+        return found
+    return Orientation.of(dataclasses.replace(record, reference=np.stack(answer, axis=1)))
 
 
 def _inverts(own):
