@@ -139,7 +139,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
-    engine.aside = stray | (record.valid & ~moving)
+    engine.spikes, engine.aside = stray, stray | (record.valid & ~moving)
     if seed is not None:
         engine.in_own_core = [cause for cause, entry in loose.items()
                               if entry.effect.restates_core]

@@ -112,7 +112,7 @@ class Engine:
         # `ReferenceNoise` that is too little to bend a fit, and counts behind no filter; or None
         self.passed_on = passed_on
         # what counts in no fit, since a signal was at fault there
-        self.aside = np.zeros(len(record), bool)
+        self.aside = self.spikes = np.zeros(len(record), bool)
         self.held_out_rows = self.problem.used & held_out(self.problem.record.reference[:, axis])
         self._learnt, self._budgets, self._structures, self._left = {}, {}, {}, {}
         # what the numerics of the simulation may still be wrong by

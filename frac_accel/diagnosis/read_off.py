@@ -31,6 +31,8 @@ class Seen:
     measured, output : ndarray, shape (n,)
     rows, used : ndarray of bool, shape (n,)
         Samples that are there, and those of them that the fit counted.
+    spikes : ndarray of bool, shape (n,)
+        Samples that it did not count since they stand far out.
     is_coarse : bool
         Whether the values' lattice accounts for much of what is left.
     parts : dict of str to float
@@ -44,6 +46,7 @@ class Seen:
     output: np.ndarray
     rows: np.ndarray
     used: np.ndarray
+    spikes: np.ndarray
     is_coarse: bool
     parts: dict
 
@@ -82,7 +85,7 @@ def read_off(engine, fitted, found, shown, sensor):
     rows = record.valid.copy()
     rows[:64] = rows[-64:] = False
     seen = Seen(record, found, sensor, p.measured[here], fitted.output[here], rows,
-                rows & p.used[here],
+                rows & p.used[here], rows & p.taken(engine.spikes)[here],
                 engine.coarse_step(fitted) is not None,
                 {entry["part"]: entry["share"] for entry in engine.budget(fitted).parts})
     # what the size of a residual tells presumes that it is noise, or bursts of it

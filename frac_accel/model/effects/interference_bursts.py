@@ -56,7 +56,8 @@ class InterferenceBursts(Effect):
     @classmethod
     def recognised(cls, seen, shown):
         """A mixture of two noises, the louder one in stretches that the motion does not explain."""
-        used = seen.used & ~_near(~seen.record.valid)
+        # a burst of a few strong samples looks like spikes
+        used = (seen.used | seen.spikes) & ~_near(~seen.record.valid)
         error, output = (seen.measured - seen.output)[used], seen.output[used]
         if len(error) < 10 * _WINDOW or seen.record.resampled:
             return None  # where the motion is too fast for one topic, the other's instants lack it
