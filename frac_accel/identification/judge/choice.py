@@ -18,7 +18,7 @@ from .records import agreement, combine, freed, is_open
 _CLEARLY = 0.7
 # Share of what a linear model could still explain of the classical residual that a fractional
 # damping must take away, and the share of a residual that chance alone seems to explain.
-_TAKEN, _SEEMING = 0.25, 0.1
+_TAKEN, _SEEMING = 0.5, 0.1
 # A resonance that far above the excited band, or known no better than this, is out of sight; of a
 # gain, the held-out residual over that with a resonance with which the gain will do.
 _IN_SIGHT, _UNDETERMINED, _NO_BETTER = 1.5, 0.2, 1.05
