@@ -7,7 +7,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
-from ..model.effects.base import CROSS_AXIS, OFFSET
+from ..model.effects.base import CROSS_AXIS, OFFSET, Effect
 from .engine import LONG, WEIGHS
 from .names import cancelling, undetermined
 from .problem import Problem, acts_on_spring
@@ -43,6 +43,8 @@ _SEVERAL, _NEAR = 3, 4.0
 _AS_WELL = 1.5
 # Standard uncertainties by which a delay below zero is one.
 _ACAUSAL = 3.0
+# Sampling intervals below which a lead is none of stamps.
+_NO_LEAD = 0.01
 _MORE = ("a linear filter would take another {:.0%} of what is left: the linear causes only "
          "imitate the true response")
 # Share of what is left that changes with time from which filters may be a mean of what moves.
@@ -166,9 +168,13 @@ def _imitators(engine, best, takes, left):
         share, more = varying, _MOVING
     else:
         more = _MORE
-    if not share or not filters:
+    if not share:
         return {}
     rest = math.sqrt(share) * left.rms
+    if not filters:
+        # a gain is the beginning of any response
+        return {cause: more.format(share) for cause, taken in takes.items()
+                if best.effects[cause].is_constant and taken < _RESEMBLES * rest}
     # a delay is common beside any filter
     odd = [cause for cause, effect in filters.items() if not effect.everyday] or list(filters)
     if len(odd) == 1 and takes.get(odd[0], np.inf) > _RESEMBLES * rest:
@@ -349,9 +355,20 @@ def _acausal(engine, best, stds):
     if len(own) >= 2 and delay < 0 and delay <= -_ACAUSAL * std:
         return dict.fromkeys(own, f"together they come to a delay of {delay:.3g} s, which no "
                                   "sensor has: they imitate something else")
+    odd = [cause for cause, effect in best.effects.items()
+           if cause not in engine.search.base and not effect.everyday
+           and type(effect).change_core is not Effect.change_core]
+    if odd and delay < 0 and -delay > max(_ACAUSAL * std, 0.5 / p.rate):
+        leads = [cause for cause in own if best.effects[cause].pure_delay_s() < 0]
+        if leads:
+            return dict.fromkeys([*leads, *odd], f"a lead of {-delay:.3g} s beside another core: "
+                                 "no sensor has it; they imitate something else")
     # the reference's delay is a lead of the sensor
     late = {cause: -effect.pure_delay_s() for cause, effect in links.items()
             if effect.of_reference and effect.pure_delay_s() < 0}
     return {cause: f"a lead of {lead:.3g} s beside a filter, less than a sampling interval: a "
                    "digital filter has one of its own"
-            for cause, lead in late.items() if own and lead < 1 / p.rate}
+            for cause, lead in late.items() if own and lead < 1 / p.rate} | {
+        cause: f"a lead of {lead:.3g} s, less than a hundredth of a sampling interval: the phase "
+               "of whatever else is not understood" for cause, lead in late.items()
+        if lead < _NO_LEAD / p.rate}

@@ -565,13 +565,12 @@ class Engine:
                                         f"motion and {other:.4g} in the second")
         return found
 
-    def agrees(self, best, stds, causes, other):
-        """Whether causes have the same parameters in a rival set that was fitted."""
-        rival = self.search.fits.get(other)
-        return rival is not None and all(
-            cause in rival.effects and abs(
-                getattr(rival.effects[cause], name) - getattr(best.effects[cause], name))
-            <= max(_AGREE * std, _ALIKE * abs(getattr(best.effects[cause], name)))
+    def agrees(self, best, stds, causes, other, alike=_ALIKE):
+        """Whether causes have the same parameters in another fit (or None)."""
+        return other is not None and all(
+            cause in other.effects and abs(
+                getattr(other.effects[cause], name) - getattr(best.effects[cause], name))
+            <= max(_AGREE * std, alike * abs(getattr(best.effects[cause], name)))
             for cause in causes for name, std in stds[cause].items())
 
     def noise_only(self, fitted):

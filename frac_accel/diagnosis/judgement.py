@@ -46,6 +46,8 @@ _CLEAR = 10.0
 _NEARLY = 0.05
 # Share of what the largest cause takes (RMS) that a common one must take to be named for that.
 _COMMON = 0.1
+# Share by which a parameter may move when what is only suspected is left out.
+_OTHERS = 0.25
 # Standard uncertainties from the model's own value by which a parameter has moved.
 _MOVED = 5.0
 
@@ -102,6 +104,7 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
             suspects.append(_suspect({cause}, 0.0, doubts[cause]))
         elif margin > clear or (
                 best.effects[cause].everyday and instead and g.taken > _COMMON * most
+                and margin > -clear / 2
                 and not any(effect_of(name).everyday for name in instead)):
             # of two that say the same, what is common; not what may only mend what another lacks
             findings.append(entry)
@@ -371,10 +374,12 @@ def _refitted(engine, best, named, tied):
     be bent.
     """
     base, named, dropped = engine.search.base.keys(), named & best.effects.keys(), {}
-    fitted, stds = best, engine.uncertainties(best)
+    fitted = best
+    stds = known = engine.uncertainties(best)
     missing = best.causes - base - named
     if named and missing and missing <= tied.keys() and all(
-            engine.agrees(best, stds, named, tied[cause]) for cause in missing):
+            engine.agrees(best, stds, named, engine.search.fits.get(tied[cause]))
+            for cause in missing):
         kept = {c: e for c, e in best.effects.items() if c not in missing}
         return engine.problem.fit(kept, held=kept), stds, {}
     while True:
@@ -384,7 +389,9 @@ def _refitted(engine, best, named, tied):
             stds = engine.uncertainties(fitted)
             takes = {c: engine.rms(engine.added(fitted, c)) for c in fitted.causes - base}
             found = {**by_what_is_left(engine, fitted, takes, engine.left(fitted)),
-                     **left_open(engine, fitted, stds, takes)}
+                     **left_open(engine, fitted, stds, takes),
+                     **{c: "without what is only suspected its parameters are others"
+                        for c in takes if not engine.agrees(best, known, [c], fitted, _OTHERS)}}
         elif named and not engine.predicts_better(fitted):
             found = dict.fromkeys(named, "the causes that are found predict held-out data no "
                                          "better than the model in use describes them")

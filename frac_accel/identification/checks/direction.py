@@ -160,4 +160,5 @@ def _error(words, backward):
     return IdentificationError(
         f"reference and sensor are exchanged: {words}, while taken for the sensor the reference is "
         f"one with a resonance at {backward.fit['natural_frequency_hz']:.4g} Hz and "
-        f"{backward.unexplained:.2%} unexplained; exchange the topics of --reference and --sensor")
+        f"{backward.unexplained:.2%} unexplained; exchange the topics of --reference and --sensor, "
+        "or see whether the reference itself resonates on its mount")
