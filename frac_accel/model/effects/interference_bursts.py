@@ -13,9 +13,10 @@ _MOST = 0.3
 _LOUDER = 3.0
 # Logarithm of the likelihood by which two noises must describe the residual better than one.
 _BETTER = 50.0
-# How many bursts there must be at least, and the chance that a sample after one that sticks out
+# How many bursts there must be at least (of fewer nobody can tell that the motion has not made
+# them), and the chance that a sample after one that sticks out
 # does so too: spikes and heavy tails come alone.
-_FEWEST = 5
+_FEWEST = 12
 _GOES_ON = 0.2
 # Correlation of the bursts, and of the error in them, with the motion, above which they are its: so
 # much more than chance gives, and at most so much.
