@@ -137,7 +137,7 @@ def typical_interval(stamps):
 def usable(samples):
     """Mask of the samples whose stamps advance and whose values are finite.
 
-    Where they come several at a time with one stamp, and other values, all of a batch.
+    Where they come several at a time with one stamp, and most have other values, all of a batch.
     """
     stamps = samples.stamps_ns
     good = np.isfinite(samples.values).all(axis=1)
@@ -145,9 +145,9 @@ def usable(samples):
     advances, repeats = good.copy(), good.copy()
     advances[1:] &= stamps[1:] > latest
     repeats[:1] = False
+    repeats[1:] &= stamps[1:] == latest
     differs = np.any(samples.values[1:] != samples.values[:-1], axis=1)
-    repeats[1:] &= (stamps[1:] == latest) & differs
-    if np.sum(repeats) > _BATCHES * np.sum(good):
+    if np.sum(repeats[1:] & differs) > _BATCHES * np.sum(good):
         every = advances | repeats
         if _batches((stamps[every] - stamps[0]) * 1e-9) is not None:
             return every
