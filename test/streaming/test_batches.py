@@ -10,7 +10,7 @@ import rig.record
 import scipy.interpolate
 import yaml
 
-from frac_accel import Corrector, SensorModel, validate
+from frac_accel import Corrector, SensorModel, diagnose, validate
 from frac_accel.cli import main
 from frac_accel.io.bag import RAW_TOPIC, REFERENCE_TOPIC, Samples, read_bag, write_bag
 from frac_accel.record.clock import usable
@@ -178,6 +178,16 @@ def test_validate_says_the_same_of_batches(bags):
         mine, theirs = (getattr(each.comparison, name).total.nrmse for each in (shared, own))
         assert mine == pytest.approx(theirs, rel=1e-3)
     assert shared.simulation.total.nrmse == pytest.approx(own.simulation.total.nrmse, rel=1e-2)
+
+
+def test_diagnose_takes_batches_whose_stamps_scatter():
+    record = recorded()
+    stamps = batched(10, np.random.default_rng(5), jitter_s=2e-4)
+    found = diagnose((Samples.of(record.stamps_ns, record.reference),
+                      Samples.of(stamps, record.sensor)), MODEL)
+    assert any("batches" in words for words in found.integrity.words)
+    assert any("scatter" in words for words in found.integrity.words)
+    assert {finding.cause for finding in found.findings} <= {"timestamp_jitter", "time_delay"}
 
 
 def test_correct_gives_each_sample_of_a_batch(bags, capsys):

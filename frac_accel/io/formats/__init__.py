@@ -155,6 +155,9 @@ def _write_output(target, write, infos):
     try:
         write(output.path)
         output.done()
+    except UnicodeEncodeError:
+        raise BagError(f"{target}: cannot be written: the library for this format takes only names "
+                       "that are UTF-8") from None
     except (OSError, sqlite3.Error) as error:
         raise BagError(f"{target}: cannot be written: {getattr(error, 'strerror', '') or error}") \
             from None
