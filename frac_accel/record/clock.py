@@ -102,6 +102,12 @@ class Clock:
         return cls("regular", rate, float(np.median(place)) / rate, slot, scatter)
 
 
+    def independent_stamps(self, stamps_ns):
+        """How many of its stamps scatter each for itself: one of each batch."""
+        return len(merged(1e-9 * (stamps_ns - stamps_ns[0]))) if self.kind == "batches" \
+            else len(stamps_ns)
+
+
 def require_span(stamps_ns, where):
     """Refuse stamps between which there are far more instants than samples.
 
