@@ -6,6 +6,7 @@ import numpy as np
 
 from ..io.bag import cdr
 from ..io.motion import MovedMotion
+from ..streaming.batches import restamped
 
 
 def temperatures_of(reader, topic, model):
@@ -21,7 +22,7 @@ class Sink:
     """Runs raw blocks through the corrector and writes what becomes ready."""
 
     def __init__(self, corrector, writer, type_name, topic, temperatures, keeps=False):
-        self._keeps, self._raw, self._ready = keeps, [], []
+        self._keeps, self._raw, self._taken, self._ready = keeps, [], [], []
         self._corrector, self._writer = corrector, writer
         self._temperatures = collections.deque(temperatures)
         self._type, self._topic = type_name, topic
@@ -62,16 +63,19 @@ class Sink:
             self._raw.append(samples)
 
     def _keep(self, ready):
+        if self._keeps and self._corrector.taken:
+            self._taken.append(self._corrector.taken)
         if self._keeps and len(ready):
             self._ready.append(ready)
 
     def kept(self):
-        """Raw samples, which of them were corrected, and the corrected ones."""
+        """Raw samples, those of batches at instants of their own; which of them were corrected, and
+        the corrected ones."""
         index = np.concatenate([ready.index for ready in self._ready])
         corrected = cdr.Samples.of(*(np.concatenate([getattr(ready, name) for ready in
                                                      self._ready])
                                      for name in ("stamps_ns", "values", "variance")))
-        return cdr.Samples.concatenate(self._raw), index, corrected
+        return restamped(cdr.Samples.concatenate(self._raw), self._taken), index, corrected
 
     def finish(self):
         rest = self._corrector.finish()

@@ -64,16 +64,26 @@ def _row(task):
         told.update(_told(task))
     except FracAccelError as error:
         told["error"] = " ".join(str(error).split())
+        told["is_fatal"] = _is_full(error)
     except MemoryError:
         told["error"] = "there is not enough memory for this bag"
     except OSError as error:
         told["error"] = f"{error.filename or task['bag']}: {error.strerror or error}"
-        told["is_fatal"] = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+        told["is_fatal"] = _is_full(error)
     except SystemExit:
         told["error"] = f"the options are not those of {task['verb']}"
     except Exception as error:  # one bag must not end the work on the others
         told["error"] = f"an error that nobody has foreseen: {type(error).__name__}: {error}"
     return {**told, **_costs(began_s, cpu_s), **_versions()}
+
+
+def _is_full(error):
+    """Whether an error comes from a disk that takes no more."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS):
+            return True
+        error = error.__context__
+    return False
 
 
 def _told(task):

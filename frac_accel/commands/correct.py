@@ -77,6 +77,9 @@ def run(arguments):
                            f"of {counters['samples']} samples: {fates(counters)}")
     notes = [f"the variance is without the model's parameter uncertainty: {note}"
              for note in dict.fromkeys(corrector.design.notes) if note]
+    if corrector.batch_size:
+        notes.append(f"the samples come {corrector.batch_size:.4g} at a time with one stamp: their "
+                     "instants are taken as uniform")
     for warning in [*reader.warnings, *notes]:
         print(f"warning: {warning}")
     summary = corrector.design.summary()

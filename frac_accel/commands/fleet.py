@@ -102,10 +102,12 @@ def run(arguments):
     except ModuleNotFoundError as error:
         raise FracAccelError(f"the Python library {error.name} is missing; install it with "
                              "pip install frac_accel[fleet]") from None
+    _require_utf_8([arguments.results, arguments.columns or ""])
     if arguments.workers < 1:
         raise FracAccelError(f"--workers: {arguments.workers} given, expected at least 1")
     axes = _axes(arguments)
     bags = find_bags(arguments.bags)
+    _require_utf_8([bag.url for bag in bags])
     table = Table(arguments.columns, bags)
     models = Models(getattr(arguments, "model", None), table)
     if arguments.each in ("correct", "validate") and not all(
@@ -125,6 +127,16 @@ def run(arguments):
         say(_summary(arguments, len(bags), len(tasks), failed))
         seen = _overview(arguments, store, {plan.job(models.of(bag.url)[1]) for bag in bags})
     return SOME_FAILED if seen.failed else 0
+
+
+def _require_utf_8(names):
+    """Rows are text as everybody can read it."""
+    for name in names:
+        try:
+            name.encode()
+        except UnicodeEncodeError:
+            raise FracAccelError(f"{name}: a name that is not UTF-8, which no row can hold; rename "
+                                 "it") from None
 
 
 def _axes(arguments):

@@ -289,7 +289,10 @@ class Engine:
             What the model in use says.
         """
         search, unmoved = self.search, {**fitted.effects, own.cause: own}
-        bare = self.problem.fit(unmoved, held=(own.cause,))
+        try:
+            bare = self.problem.fit(unmoved, held=(own.cause,))
+        except FracAccelError:
+            return None
         search.screens.pop(bare.causes, None)
         found = search.screen(bare)[:_RIVALS]
         trials = [(cause, search.begun(bare, cause, begin)) for _, cause, begin in found]

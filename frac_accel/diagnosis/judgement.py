@@ -391,7 +391,9 @@ def _refitted(engine, best, named, tied):
             found = {**by_what_is_left(engine, fitted, takes, engine.left(fitted)),
                      **left_open(engine, fitted, stds, takes),
                      **{c: "without what is only suspected its parameters are others"
-                        for c in takes if not engine.agrees(best, known, [c], fitted, _OTHERS)}}
+                        for c in takes if not engine.agrees(best, known, [c], fitted, _OTHERS)},
+                     **dict.fromkeys(named - fitted.causes, "beside the others that are found the "
+                                     "model's motion grows without bound")}
         elif named and not engine.predicts_better(fitted):
             found = dict.fromkeys(named, "the causes that are found predict held-out data no "
                                          "better than the model in use describes them")
@@ -462,7 +464,10 @@ def _moved(engine, best, stds):
             continue
         rows = engine.held_out_rows
         error = (engine.problem.measured - best.output)[rows]
-        held = engine.problem.simulate({**best.effects, cause: entry.effect})
+        try:
+            held = engine.problem.simulate({**best.effects, cause: entry.effect})
+        except FracAccelError:
+            continue
         g = gain(error + (best.simulated - held)[rows], error)
         if not g.is_relevant or g.taken < WEIGHS * engine.unexplained(best):
             continue

@@ -74,10 +74,20 @@ class Search:
         self.stages = stages or Stages(None, problem.limit)
 
     def fit(self, effects):
-        """Fitted set of causes, from the parameters given unless it is known."""
+        """Fitted set of causes, from the parameters given unless it is known.
+
+        Where its motion is without bound, the best that is known of fewer.
+        """
         known = self.fits.get(frozenset(effects))
         if known is None or known.rough:
-            self._keep(self.problem.finished(known) if known else self.problem.fit(effects))
+            try:
+                self._keep(self.problem.finished(known) if known else self.problem.fit(effects))
+            except FracAccelError:
+                fewer = [fit for fit in self.fits.values()
+                         if fit.causes < frozenset(effects) and not fit.rough]
+                if not fewer:
+                    raise
+                return min(fewer, key=lambda fit: fit.cost)
         return self.fits[frozenset(effects)]
 
     @property
@@ -88,7 +98,7 @@ class Search:
     def to_its_best(self, fitted):
         """A fit that what is reported rests on: trials end as soon as they cannot win."""
         better = self.problem.carried_on(self.fit(fitted.effects))
-        if better is not self.fits[fitted.causes]:
+        if better is not self.fits.get(better.causes):
             self._keep(better)
         return better
 
@@ -109,7 +119,7 @@ class Search:
 
         Nor are those whose pace would not take them to a `goal` (a cost) or near the best.
         """
-        trials = {}
+        trials, best_before = {}, best
         for effects in sets:
             key = frozenset(effects)
             if self.problem.limit.ends_search("some sets of causes were not tried"):
@@ -129,7 +139,13 @@ class Search:
             best = min(best, trials[key].cost)
         for key, trial in sorted(trials.items(), key=lambda entry: entry[1].cost):
             if trial.rough and trial.cost <= _HOPELESS * best:
-                trial = self.problem.finished(trial, _BEHIND * best, goal)
+                try:
+                    trial = self.problem.finished(trial, _BEHIND * best, goal)
+                except FracAccelError:
+                    # in finer steps it grows without bound
+                    del trials[key]
+                    best = min([best_before, *(other.cost for other in trials.values())])
+                    continue
                 best = min(best, trial.cost)
             if trial is not self.fits.get(key) and trial.cost <= _BEHIND * best:
                 trial = self._varied(trial)
@@ -365,13 +381,7 @@ class Search:
             # that fit had ended in another valley
             del self.fits[known.causes]
         found = next(iter(self.fit_all([less], fitted.cost, goal)), None)
-        if found is None:
-            try:
-                found = self.fit(less)
-            except FracAccelError:
-                # a motion without bound: the best that is known of even fewer
-                found = min((fit for fit in self.fits.values() if fit.causes <= frozenset(less)),
-                            key=lambda fit: fit.cost)
+        found = found or self.fit(less)
         if goal < found.cost and fitted.effects[cause].pure_delay_s() \
                 and not any(map(acts_on_spring, less.values())):
             # a filter of another order has another delay

@@ -105,6 +105,7 @@ class Channel:
             seconds_since_message=silent_s,
             stated_rate_hz=self._sensor.value("sample_rate_hz"),
             sampling_rate_hz=design.sampling_rate_hz if design else None,
+            batch_size=topic.stream.batch_size if topic.rate_hz else 0.0,
             warm_up_samples=design.warm_up_samples if design else None,
             counters=counters, changes=changes, load=load, findings=self._findings,
             reference_silent_s=reference_silent_s, zero_stamps=self._zero_stamps,

@@ -102,6 +102,12 @@ class Clock:
         return cls("regular", rate, float(np.median(place)) / rate, slot, scatter)
 
 
+    def independent_stamps(self, stamps_ns):
+        """How many of its stamps scatter each for itself: one of each batch."""
+        return len(merged(1e-9 * (stamps_ns - stamps_ns[0]))) if self.kind == "batches" \
+            else len(stamps_ns)
+
+
 def require_span(stamps_ns, where):
     """Refuse stamps between which there are far more instants than samples.
 
@@ -137,7 +143,7 @@ def typical_interval(stamps):
 def usable(samples):
     """Mask of the samples whose stamps advance and whose values are finite.
 
-    Where they come several at a time with one stamp, and other values, all of a batch.
+    Where they come several at a time with one stamp, and most have other values, all of a batch.
     """
     stamps = samples.stamps_ns
     good = np.isfinite(samples.values).all(axis=1)
@@ -145,9 +151,9 @@ def usable(samples):
     advances, repeats = good.copy(), good.copy()
     advances[1:] &= stamps[1:] > latest
     repeats[:1] = False
+    repeats[1:] &= stamps[1:] == latest
     differs = np.any(samples.values[1:] != samples.values[:-1], axis=1)
-    repeats[1:] &= (stamps[1:] == latest) & differs
-    if np.sum(repeats) > _BATCHES * np.sum(good):
+    if np.sum(repeats[1:] & differs) > _BATCHES * np.sum(good):
         every = advances | repeats
         if _batches((stamps[every] - stamps[0]) * 1e-9) is not None:
             return every

@@ -128,8 +128,9 @@ class Record:
         from lines through stamps that scatter; 0 where they are counted."""
         if not self.resampled or self.topics is None:
             return 0.0
-        # of a fitted line's slope
-        slopes = [np.sqrt(12 / len(topic)) * topic.clock.scatter_s
+        # of a fitted line's slope; the stamps of a batch say the same
+        slopes = [np.sqrt(12 / topic.clock.independent_stamps(topic.stamps_ns))
+                  * topic.clock.scatter_s
                   / max(1e-9 * float(topic.stamps_ns[-1] - topic.stamps_ns[0]), 1e-9)
                   for topic in self.topics]
         return float(1e6 * np.hypot(*slopes))

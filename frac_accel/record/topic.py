@@ -178,7 +178,7 @@ class Topic:
         elif clock.kind == "batches":
             words.append(f"the samples come in batches: their instants are taken as uniform at "
                          f"{clock.rate_hz:.6g} Hz")
-        elif jitter:
+        if jitter:
             words.append(f"the stamps scatter by {jitter:.3g} s (RMS), "
                          f"{jitter * clock.rate_hz:.2%} of the sampling interval")
         return words

@@ -96,20 +96,24 @@ class BridgeErrors:
         -------
         ndarray, shape (missing, 3, MEMBERS)
         """
-        due = min(_ANEW, max(_PAIRS, self._total // 8))
+        due = min(_ANEW, self._total // 8)
         if self._found_at is None or self._total - self._found_at >= due:
             self._values = np.concatenate([*self._blocks, np.empty((0, 3))])[-HISTORY:]
             self._structure = _structure(self._values, self.longest + 2)
             self._curvature = _curvature(self._values)
             self._found_at = self._total
             self._roots = {}
-        key = missing, noise.tobytes()
+        key, structure = (missing, noise.tobytes()), self._structure
+        if not structure[missing + 1].any():
+            # nothing is known but what changes over the gap itself, as in a random walk
+            structure = np.arange(len(structure))[:, None] / (missing + 1) * np.square(change)
+            self._roots = {}
         if key not in self._roots:
-            self._roots[key] = _roots(self._values, self._structure, missing, noise)
+            self._roots[key] = _roots(self._values, structure, missing, noise)
         # where the motion grows, the change over the gap says so
-        grown = np.maximum(
-            np.square(change) / np.maximum(4 * self._structure[missing + 1], 1e-300), 1.0)
-        roots = [root * np.sqrt(more) for root, more in zip(self._roots[key], grown)]
+        grown = np.square(change) / np.maximum(4 * structure[missing + 1], 1e-300)
+        roots = [root * np.sqrt(_more(root, factor, size)) for root, factor, size in zip(
+            self._roots[key], grown, np.abs(change))]
         result = self._following(missing)
         if result is None:
             result = np.zeros((3, missing, MEMBERS))
@@ -144,6 +148,13 @@ class BridgeErrors:
     def forget(self):
         """What comes does not follow what was."""
         self._near.clear()
+
+
+def _more(root, grown, change):
+    """By what a covariance is multiplied: no bridge is wrong by more than the change over it where
+    the record has no motion to compare it with."""
+    size = np.square(root).sum(axis=1).max(initial=0.0)
+    return max(1.0, min(grown, change**2 / size)) if size else 1.0
 
 
 def _rest(roots, known):

@@ -69,6 +69,8 @@ class Situation:
         Parameter ``sample_rate_hz``; 0: to be estimated.
     sampling_rate_hz : float or None
         Rate in use.
+    batch_size : float
+        How many samples share a stamp, where they do; else 0.
     warm_up_samples : int or None
         Samples that the filter needs before its first output.
     counters, changes : dict of str to int
@@ -110,6 +112,7 @@ class Situation:
     seconds_since_message: float | None = None
     stated_rate_hz: float = 0.0
     sampling_rate_hz: float | None = None
+    batch_size: float = 0.0
     warm_up_samples: int | None = None
     counters: dict = dataclasses.field(default_factory=dict)
     changes: dict = dataclasses.field(default_factory=dict)
@@ -155,7 +158,7 @@ def _judge(situation):
     grave, troubles = _grave(situation), _troubles(situation)
     if grave or troubles:
         return (ERROR if grave else WARN), "; ".join([*grave, *troubles])
-    return OK, f"correcting at {situation.sampling_rate_hz:.6g} Hz"
+    return OK, f"correcting at {situation.sampling_rate_hz:.6g} Hz" + _batches(situation)
 
 
 def _silence(s):
@@ -297,6 +300,12 @@ def _troubles(s):
     if s.load > _BUSY:
         troubles.append(f"the process uses {s.load:.0%} of a core")
     return troubles
+
+
+def _batches(s):
+    """What is done with samples that share stamps."""
+    return (f"; {s.batch_size:.3g} samples at a time share a stamp: they are taken as uniform, and "
+            "given out when the next ones come" if s.batch_size else "")
 
 
 def _other_rate(s):

@@ -50,7 +50,7 @@ class Processed:
     messages : list of bytes
         To be published.
     raw : Samples
-        What was in the messages that came in.
+        What was in the messages that came in; of batches, what the last ones say (`Stream.taken`).
     stamps_ns, values : ndarray, shape (n,) and (n, 3)
         What is in those that go out.
     arrivals_ns : ndarray, shape (n,)
@@ -120,7 +120,7 @@ class SampleMessages:
             messages = [cdr.with_frame(message, self._frame_id) for message in messages]
         messages = cdr.replace_samples(self._type_name, messages, filtered.stamps_ns,
                                        filtered.values, filtered.variance)
-        return Processed(messages, samples, filtered.stamps_ns, filtered.values,
+        return Processed(messages, _seen(self.stream, samples), filtered.stamps_ns, filtered.values,
                          np.array([arrival for _, arrival in given], np.int64))
 
     def _count_malformed(self):
@@ -183,7 +183,8 @@ class BlockMessages:
             self._starts = [self._starts[i] for i in kept]
             self._arrivals_ns = [self._arrivals_ns[i] for i in kept]
             self._frames = [self._frames[i] for i in kept]
-        return Processed(messages, samples, filtered.stamps_ns, filtered.values, arrivals_ns)
+        return Processed(messages, _seen(self.stream, samples), filtered.stamps_ns,
+                         filtered.values, arrivals_ns)
 
     def _block_of(self, index):
         return np.searchsorted(self._starts, index, "right") - 1
@@ -213,6 +214,11 @@ def _read(type_name, messages, arrivals_ns, plain, count_malformed):
         return [], [], _nothing()
     messages, arrivals_ns, blocks = zip(*readable)
     return messages, arrivals_ns, Samples.concatenate(list(blocks))
+
+
+def _seen(stream, samples):
+    """What a stream has looked at, of samples that have come in or before."""
+    return stream.taken[1] if stream.taken else samples
 
 
 def _nothing():

@@ -7,7 +7,8 @@ that makes it, so what is decided depends on the samples and their order alone. 
   same), or within a millionth of what another axis moves. Samples of a coarse quantiser are the
   same for seconds at rest, so it counts as *stuck* (*dead* at exactly zero) only after
   `STUCK_S` while another axis moves by `MOVES` of its own smallest steps or more; after `COARSE_S`
-  where the axis is used to repeating itself; and after `LONG_S` if nothing moves at all;
+  where the axis is used to repeating itself; after `UNKNOWN_S` where it has not had the time to
+  show whether it is, if another one that moves is not; after `LONG_S` if nothing moves at all;
 * *not connected*: dead, and never anything but zero since the start, as an axis that a sensor
   of one or two axes does not have;
 * *saturated*: more than half of a frame's samples at the limits of the model, twice in a row;
@@ -26,7 +27,7 @@ import numpy as np
 # of these, and how many frames they take; frames until a verdict is withdrawn; shares of the noise
 # and of the others' motion that are stillness.
 FRAME_S, FEWEST = 0.1, 10
-STUCK_S, COARSE_S, LONG_S = 0.3, 5.0, 60.0
+STUCK_S, UNKNOWN_S, COARSE_S, LONG_S = 0.3, 0.8, 5.0, 60.0
 MOVES, JUMPS = 8.0, 4.0
 REPEATED, HELD_FRAMES = 0.3, 5
 CLEAR_FRAMES = 10
@@ -68,7 +69,9 @@ class AxisMonitors:
         self._lattice = np.full(3, np.inf)
         # coarse until it has shown that it is not, in frames in which it was not still
         self._repeats, self._frames = np.ones(3), np.zeros(3)
-        self._still_s, self._moved_s = np.zeros(3), np.zeros(3)
+        # repetitions in these frames, all together and the most in one
+        self._repeated, self._most_repeated = np.zeros(3), np.zeros(3)
+        self._still_s, self._moved_s, self._fine_s = np.zeros(3), np.zeros(3), np.zeros(3)
         self._still_at = np.full(3, np.nan)
         self._at_limit, self._held = np.zeros(3, int), np.zeros(3, int)
         self._code, self._since = np.zeros(3, int), np.full(3, CLEAR_FRAMES)
@@ -156,14 +159,23 @@ class AxisMonitors:
                                   self._still_at)
         self._still_s = np.where(still, self._still_s + self._frame_s, 0.0)
         moving = span >= MOVES * self._lattice
-        others_move = np.array([moving[i - 1] or moving[i - 2] for i in range(3)])
+        fine = moving & (repeated <= _USED_TO)
+        others_move, others_fine = (np.array([axes[i - 1] or axes[i - 2] for i in range(3)])
+                                    for axes in (moving, fine))
         self._moved_s = np.where(still, self._moved_s + self._frame_s * others_move, 0.0)
+        self._fine_s = np.where(still, self._fine_s + self._frame_s * others_fine, 0.0)
         used_to = self._repeats > _USED_TO
+        # the frame in which an axis dies is half still
+        unknown = self._repeated - self._most_repeated <= _USED_TO * self._frames
         # a still axis says nothing of what it is used to
         learns = np.maximum(_LEARNS, 1 / (self._frames + _PRIOR))
         self._repeats = np.where(still, self._repeats,
                                  self._repeats + learns * (repeated - self._repeats))
         self._frames += ~still
+        self._repeated += np.where(still, 0.0, repeated)
+        self._most_repeated = np.where(still, self._most_repeated,
+                                       np.maximum(self._most_repeated, repeated))
         needed = np.where(used_to, COARSE_S, STUCK_S) * (1 - 1e-9)
-        stuck = (self._moved_s >= needed) | (self._still_s >= LONG_S)
+        stuck = ((self._moved_s >= needed) | (self._still_s >= LONG_S)
+                 | unknown & (self._fine_s >= UNKNOWN_S * (1 - 1e-9)))
         found[stuck] = np.where(np.abs(frame[:, -1]) <= tolerance, 1, 2)[stuck]

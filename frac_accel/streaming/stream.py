@@ -8,9 +8,11 @@ import numpy as np
 from ..correction.parameter_uncertainty import ParameterUncertaintyState
 from ..correction.static_terms import StaticTermsState
 from ..errors import DesignError, FracAccelError
+from ..io.samples import Samples
 from ..model.effects import Circumstances
 from ..signals.parallel_filter import FilterState, MotionPower, ParallelFilter
 from ..signals.sample_rate import estimate_rate
+from .batches import Batches, rate_of_batches, share_stamps
 from .bridging import BridgeEnsemble
 from .history import UnknownHistory
 from .monitors import FAULTS, NOT_CONNECTED, AxisMonitors
@@ -92,6 +94,12 @@ class Stream:
     ``waiting`` + ``warm_up`` + ``cut_off`` + ``duplicates`` + ``stamps_back`` + ``early`` +
     ``not_finite`` + ``implausible`` + ``without_rate`` + ``faulty``. Those given while an axis
     was distrusted are ``distrusted``.
+
+    Attributes
+    ----------
+    taken : (ndarray of int64, Samples) or None
+        Running numbers of the samples that the last call of `process` or `finish` has looked at,
+        and these with the stamps that they were taken for, where they share stamps (`batches`).
     """
 
     # Whether the axes are watched; what drives a simulation may stand still.
@@ -121,6 +129,7 @@ class Stream:
         self._clock = None
         self._prepared = None
         self.design = None
+        self.taken = None
         if sampling_rate_hz:
             self._start(float(sampling_rate_hz))
 
@@ -151,11 +160,17 @@ class Stream:
         return self._clock is not None and self._plausibility.learns
 
     @property
+    def batch_size(self):
+        """How many samples share a stamp, where they do (`batches`); else 0."""
+        return self._batches.size if self._clock else 0.0
+
+    @property
     def counters(self):
         """How many samples met which fate, as a new dict of str to int."""
         counters = {"samples": self._samples, "waiting": self._held_count, **self._totals}
         if self._clock:
-            counters["waiting"] = int(np.sum(self._waiting_index >= 0)) + self._plausibility.waiting
+            counters["waiting"] = (int(np.sum(self._waiting_index >= 0))
+                                   + self._plausibility.waiting + len(self._batches.waiting))
             for name, count in self._clock.counters.items():
                 counters[name] = counters.get(name, 0) + count
         return counters
@@ -167,7 +182,7 @@ class Stream:
             return np.concatenate([np.empty(0, np.int64), *(block[0] for block in self._held)])
         waiting = self._waiting_index[self._waiting_index > self._last_given]
         held = self._plausibility.held
-        return np.concatenate([waiting, held[0]]) if held else waiting
+        return np.concatenate([waiting, *held[:1], self._batches.waiting])
 
     def process(self, stamps_ns, values, variance=None):
         """Filter the next samples.
@@ -204,6 +219,7 @@ class Stream:
         if variance.shape != values.shape:
             raise FracAccelError(f"variance: shape {variance.shape} given, expected "
                                  f"{values.shape}")
+        self.taken = None
         if not len(stamps):
             return _concatenated([])
         if not (variance.min() >= 0 and variance.max() < LARGEST):
@@ -234,6 +250,7 @@ class Stream:
         FracAccelError
             If the rate cannot be estimated at all.
         """
+        self.taken = None
         if self._clock is None:
             if not self._held_count:
                 return _concatenated([])
@@ -241,9 +258,8 @@ class Stream:
                 raise FracAccelError(
                     f"the sampling rate cannot be estimated from {self._samples} sample(s) whose "
                     "stamps do not advance or are too far apart; give it as sampling_rate_hz")
-            ready = self._filter_held()
-            return _concatenated([ready, self._filter_decided(*self._nothing_more())])
-        return self._filter_decided(*self._nothing_more())
+            return _concatenated([self._filter_held(), self._finish()])
+        return self._finish()
 
     def prepare(self, model, design=None, **wishes):
         """Design the filters of another model without using them yet.
@@ -288,6 +304,7 @@ class Stream:
             If the new filter cannot be met; the old model then stays.
         """
         wishes = {**self._wishes, **wishes}
+        self.taken = None
         if self._clock is None:
             self._adopt(model)
             self._wishes = wishes
@@ -378,7 +395,16 @@ class Stream:
         while self._advancing and self._held_count >= least:
             index, stamps, values, variance = (np.concatenate(part) for part in zip(*self._held))
             count = max(RATE_SAMPLES, int(np.argmax(np.diff(stamps) > 0)) + 2)
-            if tells_rate(stamps[:count]):
+            if share_stamps(stamps[:count], values[:count]):
+                rate, unusable = rate_of_batches(stamps, least < RATE_SAMPLES)
+                if rate:
+                    self._start(rate)
+                    self._batches.begin(len(stamps) / len(np.unique(stamps)))
+                elif unusable:
+                    count = unusable
+                if not unusable:
+                    return rate is not None
+            elif tells_rate(stamps[:count]):
                 self._start(estimate_rate(stamps[:count]))
                 return True
             # most of the samples are missing between them
@@ -394,6 +420,7 @@ class Stream:
         self._use(self._designed(self._model, rate, self._wishes))
         self._clock = SampleClock(rate, self.design.warm_up_samples)
         self._clock.noise_variance = self._noise_variance
+        self._batches = Batches(rate)
         self._last_given = -1
         self._forget()
         self._begin()
@@ -421,14 +448,23 @@ class Stream:
         self._waiting_index = np.empty(0, np.int64)
         self._waiting_stamps = np.empty(0, np.int64)
 
-    def _filter(self, *samples):
+    def _filter(self, *samples, is_end=False):
+        samples, began_at = self._batches.take(*samples, is_end)
+        if began_at is not None:
+            self._clock.begin_anew(began_at)
+        if self._batches.size:
+            self.taken = samples[0], Samples.of(*samples[1:])
         if self._is_watched:
             self._monitors.add(samples[0], samples[2])
         return self._filter_decided(*self._plausibility.judge(*samples))
 
-    def _nothing_more(self):
-        none = np.empty(0, np.int64)
-        return self._plausibility.judge(none, none, np.empty((0, 3)), np.empty((0, 3)), True)
+    def _finish(self):
+        none = np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3))
+        taken = self.taken
+        ready = [self._filter(*none, is_end=True),
+                 self._filter_decided(*self._plausibility.judge(*none, True))]
+        self.taken = _both(taken, self.taken)
+        return _concatenated(ready)
 
     def _filter_decided(self, index, stamps, values, variance, plausible, finite):
         parts = []
@@ -631,6 +667,13 @@ def _range_of(plausible_range):
         raise FracAccelError(f"plausible_range: {low:g} to {high:g} given, expected the lowest and "
                              "the highest value that can be true")
     return low, high
+
+
+def _both(taken, more):
+    """What two calls have looked at."""
+    if taken is None or more is None:
+        return taken or more
+    return np.concatenate([taken[0], more[0]]), Samples.concatenate([taken[1], more[1]])
 
 
 def _shifted(bridges, by):

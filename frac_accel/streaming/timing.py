@@ -8,7 +8,8 @@ The stated policy, each case counted:
   memory is bridged by linear interpolation (``gaps``, ``filled``), with the errors that `bridging`
   finds for it; a longer one starts the filter anew (``restarts``), and so does every gap while more
   than `MOST_LOST` of the last `LOSS_WINDOW` samples are missing: nothing is given out then.
-* The same stamp again is dropped (``duplicates``), and so is a stamp that goes back
+* Samples that come in batches with one stamp get instants of their own before all this (`batches`).
+* The same stamp again is dropped otherwise (``duplicates``), and so is a stamp that goes back
   (``stamps_back``); after `PATIENCE` of these in a row the clock itself has been set back, and the
   filter starts anew. A stamp that is `MISSING` intervals early is one sample too many (``early``).
 * A sample with a value that is not finite (``not_finite``) or that cannot be true (``implausible``,
@@ -105,8 +106,12 @@ class SampleClock:
         self.counters = dict.fromkeys(
             ("jitter", "gaps", "filled", "duplicates", "stamps_back", "early", "not_finite",
              "implausible", "restarts"), 0)
-        self._last = None
+        self._last = self._anew_at = None
         self._backward = 0
+
+    def begin_anew(self, index):
+        """Let the sample with this running number follow no other."""
+        self._anew_at = index
 
     @property
     def longest_gap(self):
@@ -124,12 +129,20 @@ class SampleClock:
         usable, finite : ndarray of bool, shape (n,), or None
             Samples that are not usable are dropped, as not finite or implausible; None: all are.
         """
-        runs = []
-        for start in range(0, len(index), _CHUNK):
-            part = slice(start, start + _CHUNK)
+        runs, start = [], 0
+        while start < len(index):
+            stop = start + _CHUNK
+            if self._anew_at is not None:
+                stop = min(stop, start + int(np.searchsorted(index[start:], self._anew_at)))
+                if stop == start:
+                    self.counters["restarts"] += self._last is not None
+                    self._last = self._anew_at = None
+                    continue
+            part = slice(start, stop)
             self._sort(index[part], stamps_ns[part], values[part], variance[part],
                        None if usable is None else usable[part],
                        None if finite is None else finite[part], runs)
+            start = stop
         return _joined(runs)
 
     def _drop(self, is_finite):

@@ -18,6 +18,7 @@ from ..signals.metrics import ErrorMetrics, error_metrics, interpolate, octave_b
 from ..signals.thinning import envelope
 from ..simulation import simulate
 from ..streaming import Corrector
+from ..streaming.batches import restamped
 from .reference import restored
 
 # A stamp that has been moved by a skew and back.
@@ -140,7 +141,7 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     reference = restored(reference, sensor, model, axis, temperature_at)
     pair = Record.of(reference, sensor, axis)
     corrector = Corrector(model, **wishes)
-    parts = [*_corrected(corrector, sensor, temperature_at), corrector.finish()]
+    parts, taken = zip(*_corrected(corrector, sensor, temperature_at))
     stamps, values, variance = (np.concatenate([getattr(part, name) for part in parts])
                                 for name in ("stamps_ns", "values", "variance"))
     if corrector.design is None:
@@ -149,7 +150,8 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     if not len(stamps):
         raise FracAccelError(f"{len(sensor.stamps_ns)} samples are fewer than the filter needs to "
                              f"warm up ({corrector.design.warm_up_samples})")
-    comparison = compare(reference, sensor, Samples.of(stamps, values, variance),
+    seen = restamped(sensor, [each for each in taken if each])
+    comparison = compare(reference, seen, Samples.of(stamps, values, variance),
                          corrector.design, axis)
     bands = [band.band_hz for band in comparison.corrected.bands]
     measured, simulated = _simulated(model, pair, AXES.index(axis), temperature_at)
@@ -224,7 +226,8 @@ def _known_reference(pair):
 
 
 def _corrected(corrector, sensor, temperature_at):
-    """Parts of the corrected record; the temperature follows the stamps once a second."""
+    """Parts of the corrected record, and what was taken for them; the temperature follows the
+    stamps once a second."""
     step = len(sensor.stamps_ns)
     if temperature_at is not None:
         step = max(1, round(step / max(1.0, 1e-9 * np.ptp(sensor.stamps_ns))))
@@ -232,7 +235,8 @@ def _corrected(corrector, sensor, temperature_at):
         stamps, values, variance = (column[start:start + step] for column in sensor[:3])
         if temperature_at is not None:
             corrector.set_temperature(float(temperature_at(stamps).mean()))
-        yield corrector.process(stamps, values, variance)
+        yield corrector.process(stamps, values, variance), corrector.taken
+    yield corrector.finish(), corrector.taken
 
 
 def _simulated(model, pair, column, temperature_at):

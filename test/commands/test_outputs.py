@@ -461,6 +461,19 @@ def test_names_that_are_not_utf_8(place, report):
     assert process.returncode == 2
 
 
+@pytest.mark.parametrize("arguments", [
+    ["convert", "in.mcap", "-o", b"\xfe.csv"], ["convert", "in.mcap", "-o", b"\xfe.parquet"],
+    ["fleet", "correct", b"caf\xe9.mcap", "--model", "m.yaml", "-o", "results"],
+    ["fleet", "correct", "in.mcap", "--model", "m.yaml", "-o", b"\xfe"]])
+def test_names_that_other_libraries_cannot_have_are_refused(place, arguments, capsys):
+    os.link("in.mcap", os.fsdecode(b"caf\xe9.mcap"))
+    before = sorted(os.listdir(place))
+    assert main([os.fsdecode(part) for part in arguments]) == 2
+    line, = capsys.readouterr().err.splitlines()
+    assert "UTF-8" in line
+    assert sorted(os.listdir(place)) == before
+
+
 def test_main_leaves_signals_as_it_found_them(place):
     before = [signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)]
     assert cli.main(["validate", "in.mcap", "--model", "m.yaml"]) == 0

@@ -8,15 +8,19 @@ import builtins
 import errno
 import importlib
 import io
+import json
 import os
+import re
+import resource
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from fuzz import case, seeds
+from fuzz import seeds
 
-from frac_accel.cli import main
+from frac_accel.cli import VERBS, main
 from frac_accel.io.bag import write_bag
 
 COMMANDS = {
@@ -24,14 +28,24 @@ COMMANDS = {
     "simulate, folder": ["in.mcap", "--model", "m.yaml", "-o", "new", "--json", "r.json"],
     "correct": ["in.mcap", "--model", "m.yaml", "-o", "o.mcap", "--json", "r.json"],
     "correct, folder": ["in.mcap", "--model", "m.yaml", "-o", "new"],
-    "validate": ["in.mcap", "--model", "m.yaml", "--json", "r.json"],
+    "correct, page": ["in.mcap", "--model", "m.yaml", "-o", "o.mcap", "--report", "r.html"],
+    "validate": ["in.mcap", "--model", "m.yaml", "--json", "r.json", "--report", "r.html"],
+    "convert": ["in.mcap", "-o", "o.mcap", "--json", "r.json"],
+    "convert, folder": ["in.mcap", "-o", "new"],
+    "convert, npz": ["in.mcap", "-o", "o.npz", "--json", "r.json"],
     "identify": ["in.mcap", "--structure", "oscillator", "-o", "o.yaml", "--json", "r.json",
                  "--report", "r.html"],
     "diagnose": ["in.mcap", "--model", "m.yaml", "--extended-model", "o.yaml", "--json", "r.json",
                  "--report", "r.html"],
     "budget": ["in.mcap", "--model", "m.yaml", "--json", "r.json"],
+    "report": ["found.json", "-o", "r.html"],
+    "layout": ["foxglove", "-o", "o.json"],
+    "bench": ["kernel", "--rounds", "1", "--json", "r.json"],
     "paper": ["--quick", "--json", "r.json", "--report", "r.html"],
 }
+# Verbs that are not there, with the reason.
+WITHOUT = {"watch": "it writes no file", "completion": "it writes no file",
+           "fleet": "rows that are done stay: a test of its own, below"}
 # What writes, by module; files are counted write by write.
 CALLS = {os: ("fsync", "replace", "mkdir")}
 
@@ -51,7 +65,9 @@ class Failing:
 
     def wrapped(self, function):
         def wrapper(*arguments, **options):
-            self.call()
+            # a folder that is there already needs no room
+            if not (function is MKDIR and os.path.isdir(arguments[0])):
+                self.call()
             return function(*arguments, **options)
         return wrapper
 
@@ -72,7 +88,7 @@ class _File(io.FileIO):
         return super().write(data)
 
 
-OPEN = io.open
+OPEN, MKDIR = io.open, os.mkdir
 
 
 @pytest.fixture
@@ -93,7 +109,8 @@ def compute_once(monkeypatch):
     """The work before the writing is the same each time."""
     for where, name in (("identification", "identify"), ("diagnosis", "diagnose"),
                         ("paper", "reproduce"), ("validation", "validate"),
-                        ("simulation", "simulate"), ("budget", "left_by"),
+                        ("simulation", "simulate"), ("budget", "left_by"), ("bench.kernel", "run"),
+                        ("report.correction", "correction_page"),
                         ("report.identification", "identification_page"),
                         ("report.diagnosis", "diagnosis_page"), ("report.paper", "paper_page")):
         module = importlib.import_module(f"frac_accel.{where}")
@@ -127,13 +144,17 @@ def test_a_write_that_fails_leaves_everything_as_it_was(command, error, existing
                                                         monkeypatch, capsys, failing):
     if existing and error == "input/output error":
         pytest.skip("as a full disk")
-    if command == "paper" and (existing or error != "disk full"):
-        pytest.skip("its page takes seconds, and is written as that of the others")
+    if command in ("paper", "bench") and (existing or error != "disk full"):
+        pytest.skip("it takes seconds, and writes as the others do")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("TQDM_DISABLE", "1")
+    # bench says how busy the machine is
+    monkeypatch.setattr(os, "getloadavg", lambda: (0.0, 0.0, 0.0))
     write_bag("in.mcap", seeds.samples(np.random.default_rng(1), {
         **seeds.PLAIN, "effects": [{"cause": "cubic_stiffness", "alpha3": 1e-4}]}))
     Path("m.yaml").write_text(seeds.text_of(seeds.PLAIN))
+    if command == "report":
+        Path("found.json").write_text(json.dumps(seeds.results()[0]))
     arguments = [command.split(",")[0], *COMMANDS[command]]
     outputs = [name for name in arguments if name.startswith(("o.", "r.")) or name == "new"]
     for name in outputs if existing else ():
@@ -166,4 +187,87 @@ def test_a_write_that_fails_leaves_everything_as_it_was(command, error, existing
 
 
 def test_every_command_is_here():
-    assert {command.split(",")[0] for command in COMMANDS} == {*case.SHARES, "paper"}
+    assert {command.split(",")[0] for command in COMMANDS} == VERBS.keys() - WITHOUT.keys()
+
+
+@pytest.mark.parametrize("error", ["disk full", "memory"])
+def test_a_fleet_goes_on_from_any_write_that_fails(error, tmp_path, monkeypatch, capsys, failing):
+    """What is done stays, nothing is half there, and the same command completes it."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TQDM_DISABLE", "1")
+    write_bag("in.mcap", seeds.samples(np.random.default_rng(1)))
+    Path("m.yaml").write_text(seeds.text_of(seeds.PLAIN))
+
+    def run(results):
+        capsys.readouterr()
+        status = main(["fleet", "correct", "in.mcap", "--model", "m.yaml", "-o", results, "--map",
+                       "builtins:map"])
+        return status, capsys.readouterr().err.splitlines()
+
+    assert run("first") == (0, [])
+    usual = sorted(re.sub("-[0-9a-f]{32}", "", name).replace("first", "results")
+                   for name in content(tmp_path) if name.startswith("first"))
+    inputs = {name: told for name, told in content(tmp_path).items() if "first" not in name}
+    fault = failing(ERRORS[error])
+    while True:
+        fault.count, fault.chosen = 0, fault.chosen + 1
+        status, said = run("results")
+        if fault.count < fault.chosen:
+            break
+        # a bag that takes too much memory is done with, a full disk will have room
+        assert status == 2 and len(said) == 1 or error == "memory" and (status, said) == (4, [])
+        fault.chosen, chosen = -1, fault.chosen
+        assert run("results") == (0 if status == 2 else 4, [])
+        if status == 4:
+            shutil.rmtree("results")
+            fault.chosen = chosen
+            continue
+        names = [name for name in content(tmp_path) if name.startswith("results")]
+        assert sorted({re.sub("-[0-9a-f]{32}", "", name) for name in names}) == usual
+        assert inputs.items() <= content(tmp_path).items()
+        shutil.rmtree("results")
+        fault.chosen = chosen
+    assert status == 0 and fault.chosen > 10
+
+
+@pytest.mark.parametrize("output", ["o.mcap", "o.csv", "o.parquet", "o.npz", "o.db3", "o.mf4",
+                                    "new"])
+def test_a_disk_that_is_full_behind_any_library_leaves_nothing(output, tmp_path, monkeypatch):
+    """Files may not grow beyond a size: libraries that do not write by Python are told so, too."""
+    monkeypatch.chdir(tmp_path)
+    write_bag("in.mcap", seeds.samples(np.random.default_rng(1)))
+    before = content(tmp_path)
+    status, said = in_child(["convert", "in.mcap", "-o", output, "--json", "r.json"])
+    assert status == 0, said
+    made = Path(output)
+    size = max(path.stat().st_size for path in (made.iterdir() if made.is_dir() else [made]))
+    shutil.rmtree(made) if made.is_dir() else made.unlink()
+    Path("r.json").unlink()
+    # each takes a process of its own for .mf4
+    for most in (0, size // 2, size - 1)[:1 if output == "o.mf4" else None]:
+        status, said = in_child(["convert", "in.mcap", "-o", output, "--json", "r.json"], most)
+        assert status == 2, (most, said)
+        line, = said.splitlines()
+        assert line.startswith("frac_accel convert: ") and len(line) > 40
+        assert content(tmp_path) == before
+
+
+def in_child(arguments, most_bytes=resource.RLIM_INFINITY):
+    """Exit status and what was said by a command whose files may not be larger."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if not child:
+        status = 70
+        try:
+            os.environ["TQDM_DISABLE"] = "1"
+            sys.stderr = open(writing, "w")
+            sys.stdout = open(os.devnull, "w")
+            resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, resource.RLIM_INFINITY))
+            status = main(arguments)
+            sys.stderr.flush()
+        finally:
+            os._exit(status)
+    os.close(writing)
+    with open(reading) as stream:
+        said = stream.read()
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), said

@@ -127,6 +127,28 @@ def test_every_fault_of_the_stream_is_counted_and_passes(record, model_file):
             assert len(of_part) >= len(samples.stamps_ns) - warm_up - 11, name
 
 
+def test_samples_that_share_stamps_get_their_own_and_that_is_said(record, model_file):
+    """As a driver publishes that reads a queue of eight; the rate is not stated."""
+    samples = samples_of(record, 0, 10_000)
+    last = np.minimum(np.arange(10_000) // 8 * 8 + 7, 9999)
+    samples = samples._replace(stamps_ns=samples.stamps_ns[last])
+    offline = Corrector(SensorModel.load(model_file))
+    expected = offline.process(*samples[:3])
+    with running(model_file) as (probe, node, _):
+        received = probe.collect(Imu, "/imu/data")
+        publisher = probe.publisher(Imu, "/imu/data_raw")
+        with background(publish, [(publisher, encoded(samples))], RATE_HZ):
+            status = probe.status("8 samples at a time share a stamp")
+        probe.until(lambda: len(received) >= len(expected), "too few")
+        assert node.stop() == 0
+    assert status.level == b"\0"
+    live = cdr.read_samples(cdr.IMU, received)
+    np.testing.assert_array_equal(live.stamps_ns, expected.stamps_ns)
+    np.testing.assert_array_equal(live.values, expected.values)
+    assert len(expected) > 9900 and np.ptp(np.diff(live.stamps_ns)) <= 2
+    assert "is made again" not in node.text
+
+
 def test_a_subscriber_that_asks_for_too_much_is_named_and_harms_nobody(record, model_file):
     samples = samples_of(record, 0, 1500)
     with running(model_file, sample_rate_hz=RATE_HZ) as (probe, node, _):

@@ -1,8 +1,11 @@
-"""The example policy has what the nodes' source asks of DDS, and nobody else may change a model."""
+"""The example policy has what the nodes ask of DDS, and nobody else may change a model."""
 
+import contextlib
 import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[2]
 POLICY = ElementTree.parse(ROOT / "config" / "sros2_policy.xml").getroot()
@@ -68,3 +71,40 @@ def test_every_pin_has_a_hash_and_pip_asks_for_them():
     recipes = [line for line in (ROOT / "Makefile").read_text().splitlines()
                if "pip install" in line and "--editable" not in line]
     assert len(recipes) >= 3 and all("--require-hashes" in line for line in recipes)
+
+
+@pytest.mark.ros
+def test_no_node_asks_for_more_than_its_profile_has(tmp_path):
+    """With security on, a node that may not answer its own parameter services does not start."""
+    pytest.importorskip("rclpy")
+    from ros_probe import Probe
+    from ros_processes import NodeProcess, ros_domain
+    model = tmp_path / "m.yaml"
+    model.write_text("schema: frac_accel/sensor_model/1\n"
+                     "core: {natural_frequency_hz: 90.0, damping_ratio: 0.2}\n")
+    bag = ROOT / "bags" / "classical_bench.mcap"
+    nodes = {"corrector": {"model_file": model, "metrics_topics": True},
+             "virtual_sensor": {"model_file": model}, "diagnoser": {"model_file": model},
+             "recorder": {"bag": tmp_path / "o.mcap", "topics": ["/imu/data"]},
+             "player": {"bag": bag, "wait_for_subscribers": 9,
+                        "topics": ["/imu/reference", "/imu/data_raw"]}}
+    with contextlib.ExitStack() as running:
+        environment = running.enter_context(ros_domain())
+        probe = running.enter_context(Probe(environment))
+        for name, parameters in nodes.items():
+            running.enter_context(NodeProcess(name, environment, parameters))
+        graph = probe.node
+        found = {"topic": {"publish": graph.get_publisher_names_and_types_by_node,
+                           "subscribe": graph.get_subscriber_names_and_types_by_node},
+                 "service": {"reply": graph.get_service_names_and_types_by_node,
+                             "request": graph.get_client_names_and_types_by_node}}
+        probe.until(lambda: set(nodes) <= set(graph.get_node_names()), graph.get_node_names)
+        probe.until(lambda: all(len(graph.get_service_names_and_types_by_node(name, "/")) >= 7
+                                for name in nodes), "no services")
+        asked = {(name, kind, way): {entry for entry, _ in ask(name, "/")} for name in nodes
+                 for kind, ways in found.items() for way, ask in ways.items()}
+    for (name, kind, way), entries in asked.items():
+        may = [f"/{rule}".replace("/~", f"/{name}") for rule in allowed(name, kind, way)]
+        assert not {entry for entry in entries if not any(
+            re.fullmatch(rule.replace("*", ".*"), entry) for rule in may)}, (name, kind, way)
+        assert entries or way in ("subscribe", "request"), (name, kind, way)

@@ -67,6 +67,30 @@ def test_an_axis_that_fails_two_seconds_after_the_start_is_named_at_once(value):
     assert (variance[index > start + 0.5 * RATE, 1] == DISTRUSTED).all()
 
 
+@pytest.mark.parametrize("at_s", [0.0, 0.05, 0.13, 0.25, 0.4, 0.9, 1.5])
+@pytest.mark.parametrize("value", [0.0, 0.7])
+def test_an_axis_that_fails_at_the_start_is_named_within_a_second(value, at_s):
+    values = motion(12)
+    start = int(at_s * RATE)
+    values[start:, 1] = value
+    (index, _, variance), faults = run(corrector(noise_std=0.02), values)
+    assert faults[-1][1] == ("not connected" if not value + at_s else "stuck" if value else "dead")
+    assert (variance[index > start + RATE, 1] == DISTRUSTED).all()
+    assert (variance[:, [0, 2]] < 1).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_coarse_axis_at_rest_from_the_start_beside_others_that_move_is_left_alone(seed):
+    """For the time that tells it from one that has failed."""
+    step = 0.25
+    values = motion(seed, 2000, step)
+    assert np.mean(np.diff(values[:, 1]) == 0) > 0.3
+    values[:, 0] = 0.0981
+    values[10, 0] += 0.0981
+    _, faults = run(corrector(noise_std=0.1), values)
+    assert {f for each in faults for f in each} == {""}
+
+
 @pytest.mark.parametrize("kind, word, effects", [
     ("dead", "dead", ()), ("stuck", "stuck", ()), ("dithered", "stuck", ()), ("held", "held", ()),
     ("saturated", "saturated", [{"cause": "clipping", "lower": -4.0, "upper": 4.0},

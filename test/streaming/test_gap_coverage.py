@@ -88,6 +88,28 @@ def test_so_they_do_a_second_after_the_start(order, snr_db):
     assert 0.93 <= np.mean(np.abs(np.concatenate(scaled)) < 2) <= 0.97
 
 
+@pytest.mark.parametrize("share", [0.3, 0.5])
+@pytest.mark.parametrize("order", [0.5, 1.0])
+def test_so_they_do_where_samples_are_lost_from_the_first_on(order, share):
+    """A gap before anything is known of the motion is no ground for a deviation beyond all."""
+    def keep(rng, n, longest):
+        kept = (rng.random(n) > share) & (np.arange(n) < 4000)
+        kept[:6] = True, False, True, False, False, True
+        return kept
+
+    scaled, largest = [], []
+    for seed in range(4):
+        rng, model, record, bandwidth = record_of(order, seed)
+        kernel = Corrector(model, RATE, bandwidth_hz=bandwidth, noise_std=record.noise_std)
+        kept = keep(rng, len(record.sensor), None)
+        result = kernel.process(record.stamps_ns[kept], record.sensor[kept])
+        truth = interpolate(record.stamps_ns, record.reference, result.stamps_ns, RATE)
+        scaled.append(((result.values - truth) / np.sqrt(result.variance))[200:])
+        largest.append(np.sqrt(result.variance).max() / np.std(record.reference))
+    assert 0.93 < np.mean(np.abs(np.concatenate(scaled)) < 2) < 0.975
+    assert max(largest) < 100
+
+
 @pytest.mark.parametrize("order", [0.5, 1.0])
 def test_nothing_is_given_while_nine_of_ten_are_lost(order):
     runs = [scaled_errors(order, seed, losses(0.9)) for seed in range(SEEDS)]

@@ -7,6 +7,7 @@ import atexit
 import contextlib
 import heapq
 import shutil
+import sqlite3
 import tempfile
 from pathlib import Path
 
@@ -154,8 +155,12 @@ def _write_output(target, write, infos):
     try:
         write(output.path)
         output.done()
-    except OSError as error:
-        raise BagError(f"{target}: cannot be written: {error.strerror or error}") from None
+    except UnicodeEncodeError:
+        raise BagError(f"{target}: cannot be written: the library for this format takes only names "
+                       "that are UTF-8") from None
+    except (OSError, sqlite3.Error) as error:
+        raise BagError(f"{target}: cannot be written: {getattr(error, 'strerror', '') or error}") \
+            from None
     finally:
         if not output.is_complete:
             output.drop()
