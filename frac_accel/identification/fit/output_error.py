@@ -76,8 +76,8 @@ class Fit:
         Where the search ended, in its own coordinates.
     at_bounds : tuple of str
         The structure's parameters with which it ended at a bound of the search.
-    gradient : ndarray, shape (p - 1, m), or None
-        Derivatives of the output by all parameters but the offset, at the m samples that count.
+    gradient : ndarray, shape (p - 1, n), or None
+        Derivatives of the output by all parameters but the offset; 0 where not judged.
     free_share : float
         Power of the free swing that began before the record, of the output's.
     fastest_decay : float
@@ -482,23 +482,26 @@ class _Problem:
         found = self.rows(theta)
         residual = found.residual
         if uncertainty:
-            # changed in place, and never asked for again
+            # changed in place, and never asked for again, as is what they were made with
             jacobian = found.rows
             self.rows_of.clear()
+            self.convolution = self.prepared = None
             # the offset is what remains with the whole reference, not with the part that moves
             jacobian[0] += self.level
             jacobian[count:] *= linear[0]
             jacobian[count:-1] = np.linalg.inv(factors.T) @ jacobian[count:-1]
             jacobian[-1] *= self.rate
             # sensitivity, structure, delay, offset, free motions
-            gradient = jacobian[[0, *range(count, len(jacobian))]]
+            gradient = np.zeros((1 + len(jacobian) - count, self.n))
+            for row, place in zip(gradient, (0, *range(count, len(jacobian)))):
+                row[self.judged] = jacobian[place]
             order = [0, *(count + np.flatnonzero(~held)), *range(1, count)]
             if found.swing is not None and (stuck.any() or not found.real):
                 # what noise, or a tone that never decays, can feign of a swing tells no frequency
-                longer = self.instants * found.swing
                 order += [len(jacobian), len(jacobian) + 1]
                 jacobian = found.room
-                jacobian[-2], jacobian[-1] = longer.real, longer.imag
+                np.multiply(self.instants, found.swing.real, out=jacobian[-2])
+                np.multiply(self.instants, found.swing.imag, out=jacobian[-1])
             if held.any():
                 jacobian, order = jacobian[order], range(len(order))
             free = np.flatnonzero(np.r_[True, ~held, True])

@@ -35,12 +35,13 @@ def sandwich(jacobian, residual, used):
     ndarray, shape (p, p)
         Huge, not small, for what the data leave open.
     """
-    scale = np.linalg.norm(jacobian, axis=0)
+    gram = jacobian.T @ jacobian
+    scale = np.sqrt(np.diag(gram))
     # the smoothed spectrum reaches over lags of a few times the root of the record
     length = next_fast_len(len(used) + int(_REACH * np.sqrt(len(used))), real=True)
     spectra = _spectra(jacobian.T, scale, used, length)
     power = np.square(np.abs(_spectra(residual[None], np.ones(1), used, length)[0]))
-    values, vectors = np.linalg.eigh((jacobian.T @ jacobian) / np.outer(scale, scale))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     root = vectors / np.sqrt(np.maximum(values, 1e-14 * values[-1]))
     # what a fit to white noise leaves of each line
     left = np.empty(len(power))

@@ -74,14 +74,14 @@ def _flat_instead(candidates):
     there to its liking; it is believed only where it predicts clearly better.
     """
     try:
-        flat, classical = candidates["gain"], candidates["oscillator"]
+        classical = candidates["oscillator"]
+        data, resonance = candidates.data, classical.fit["natural_frequency_hz"]
+        std = classical.fit.std[classical.fit.names.index("natural_frequency_hz")]
+        highest = excited_band(data.reference, data.sensor, data.pair.sampling_rate_hz)[1]
+        if resonance < _IN_SIGHT * highest and std < _UNDETERMINED * resonance:
+            return None
+        flat = candidates["gain"]
     except IdentificationError:
-        return None
-    data = candidates.data
-    resonance = classical.fit["natural_frequency_hz"]
-    std = classical.fit.std[classical.fit.names.index("natural_frequency_hz")]
-    highest = excited_band(data.reference, data.sensor, data.pair.sampling_rate_hz)[1]
-    if resonance < _IN_SIGHT * highest and std < _UNDETERMINED * resonance:
         return None
     delay, delay_std = (values[classical.fit.names.index("delay_s")]
                         for values in (classical.fit.values, classical.fit.std))

@@ -221,10 +221,7 @@ def _moments(error, reference, used, lags, gradient, noise):
     """
     n = len(error)
     denominator, variance = noise
-    others = np.ones((1, n))
-    if gradient is not None:
-        size = np.maximum(np.max(gradient, axis=1), -np.min(gradient, axis=1))
-        others = np.concatenate([others, gradient / np.maximum(size, 1e-300)[:, None]])
+    others = [np.ones(n), *([] if gradient is None else gradient)]
     edges = _edges(used)
     if len(edges) == 2:
         stretch = _Stretch(error, reference, edges, lags, others)
@@ -240,7 +237,7 @@ def _moments(error, reference, used, lags, gradient, noise):
         start = max(0, stop - _BLOCK)
         columns = np.concatenate(
             [padded[start + reach - lags[:, None] + np.arange(stop - start)].T,
-             others[:, start:stop].T], axis=1)
+             np.array([row[start:stop] for row in others]).T], axis=1)
         # without the lags that reach out of the record, every column is zero there by padding
         columns *= used[start:stop, None]
         gram += columns.T @ columns
@@ -284,7 +281,7 @@ class _Stretch:
         self.start, self.stop = edges
         self.reach, self.lags = lags[-1] + 1, lags
         self.padded = np.r_[np.zeros(self.reach), reference, np.zeros(self.reach)]
-        self.others, self.error = others[:, self.start:self.stop], error[self.start:self.stop]
+        *self.others, self.error = (row[self.start:self.stop] for row in (*others, error))
 
     def shifted(self, lag, first=0, last=None):
         """Reference at a lag, at the stretch's samples from `first` to before `last`."""
@@ -293,8 +290,8 @@ class _Stretch:
 
     def right(self):
         """X'error."""
-        return np.r_[[self.error @ self.shifted(lag) for lag in self.lags],
-                     self.others @ self.error]
+        return np.array([*(self.error @ self.shifted(lag) for lag in self.lags),
+                         *(self.error @ row for row in self.others)])
 
     def gram(self, covariance, weigh):
         """X'C X with noise of some covariance by lags (`weigh`: its product with a row).
@@ -303,9 +300,16 @@ class _Stretch:
         samples at the ends.
         """
         count, length = len(self.lags), self.stop - self.start
-        rows = np.concatenate([self.others, [self.shifted(self.lags[0])]])
-        weighed = rows if weigh is None else np.array([weigh(row) for row in rows])
-        across = np.array([weighed @ self.shifted(lag) for lag in self.lags])
+        gram = np.empty((count + len(self.others),) * 2)
+        # one after the other: of a long record, all weighed rows would take most memory
+        for place, row in enumerate(self.others, count):
+            weighed = row if weigh is None else weigh(row)
+            gram[:count, place] = [weighed @ self.shifted(lag) for lag in self.lags]
+            gram[place, count:] = [weighed @ other for other in self.others]
+        gram[count:, :count] = gram[:count, count:].T
+        first = self.shifted(self.lags[0])
+        weighed = first if weigh is None else weigh(first)
+        gram[0, :count] = gram[:count, 0] = [weighed @ self.shifted(lag) for lag in self.lags]
         before, last = (self.padded[self.reach - self.lags + place - 1]
                         for place in (self.start, self.stop))
         # the weighed reference a sample before the stretch, and at its last one
@@ -318,12 +322,8 @@ class _Stretch:
         far = covariance[length] if length < len(covariance) else 0.0
         change -= far * np.outer(before, last)
         change += change.T + covariance[0] * (np.outer(before, before) + np.outer(last, last))
-        gram = np.empty((count + len(self.others),) * 2)
-        gram[0, :count] = gram[:count, 0] = across[:, -1]
         for i in range(1, count):
             gram[i, 1:count] = gram[i - 1, :count - 1] + change[i - 1, :-1]
-        gram[:count, count:], gram[count:, :count] = across[:, :-1], across[:, :-1].T
-        gram[count:, count:] = weighed[:-1] @ self.others.T
         return gram
 
 
