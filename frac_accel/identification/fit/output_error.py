@@ -302,9 +302,9 @@ class _Problem:
         return starts[:self.structure.trials]
 
     def rows(self, theta):
-        """`_Rows` at a place in the search, of which the last is kept; of short records, two."""
+        """`_Rows` at a place in the search, of which the last is kept; of short records, three."""
         return kept(self.rows_of, theta.tobytes(), self._rows, theta,
-                    most=1 if self.n > _MIDDLE_LENGTH else 2)
+                    most=1 if self.n > _MIDDLE_LENGTH else 3)
 
     def _rows(self, theta):
         own, delay = theta[:-1], theta[-1] / self.rate - self.lag_s
