@@ -160,6 +160,7 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
     IdentificationError
         If the best model explains no more than chance would.
     """
+    very_long = start is None and len(sensor) > _MUCH_LONGER * _MIDDLE_LENGTH
     if start is None:
         # where the motion is strongest is enough to find out roughly where the parameters are
         part = strongest_stretch(reference, _START_LENGTH, valid)
@@ -175,13 +176,16 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
         if rough.n == len(sensor):
             return rough.result(state, uncertainty)
         start = state.theta
-        if len(sensor) > _MUCH_LONGER * _MIDDLE_LENGTH:
+        if very_long:
             # a search is dear on all samples, where it then has little left to do
             part = strongest_stretch(reference, _MIDDLE_LENGTH, valid)
             start = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
                              None if valid is None else valid[part], lag_s).solve([start]).theta
     problem = _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s, held)
     state = problem.solve([start])
+    if very_long and structure.names and problem.explained(state) < _POOR:
+        # a long sweep is loudest in a band that may have led astray
+        state = min(state, problem.solve(problem.starts()), key=lambda state: state.cost)
     problem.require_relation(state)
     return problem.result(state, uncertainty)
 
