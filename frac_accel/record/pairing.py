@@ -139,6 +139,10 @@ def _rate_words(clock):
 
 def _on_slots(slot, values, first, last):
     """Values on all instants between two, bridged linearly; which of them are a sample's own."""
+    begin = int(slot[0])
+    if begin <= first and last <= slot[-1] == begin + len(slot) - 1 and (np.diff(slot) == 1).all():
+        # as they are: of a long record, a copy would take most memory
+        return values[first - begin:last - begin + 1], np.ones(last - first + 1, bool)
     grid = np.arange(first, last + 1)
     place = np.clip(np.searchsorted(slot, grid), 0, len(values) - 1)
     here = slot[place] == grid

@@ -207,6 +207,8 @@ class Record:
         one, two = Topic(reference, "reference"), Topic(sensor, "sensor")
         for topic in (one, two):
             _require_signal(topic, column)
+        if np.array_equal(one.stamps_ns, two.stamps_ns):
+            two.clock = one.clock
         offset = clock_offset(one, two, int(one.stamps_ns[0]))
         taken_out, words = 0.0, []
         if offset is not None and _far(offset, one, two):

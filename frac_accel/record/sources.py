@@ -61,7 +61,10 @@ def samples_of(values: Any, sampling_rate_hz: float | None = None, axis: str = "
     if array.ndim == 1:
         column, array = array, np.zeros((len(array), 3))
         array[:, AXES.index(axis)] = column
-    return Samples.of(np.round(np.arange(len(array)) * (1e9 / rate)).astype(np.int64), array)
+    # one number that looks like as many as there are values
+    unknown = np.broadcast_to(np.nan, array.shape)
+    return Samples.of(np.round(np.arange(len(array)) * (1e9 / rate)).astype(np.int64), array,
+                      unknown)
 
 
 def pair_of(source: Any, sampling_rate_hz: float | None = None, axis: str = "x",

@@ -45,10 +45,13 @@ class Convolution:
         self._length = _fast_length(_PERIOD * self._n + int(np.ceil(memory_s * rate)))
         self._sigma = _DAMPING / self._length
         damping = np.exp(-self._sigma * np.arange(self._n))
-        self._undamping = {(1, self._n): 1 / damping}
-        frequency = 2j * np.pi * np.arange(self._length // 2 + 1) / self._length
-        self._s = (self._sigma + frequency) * rate
         self._spectrum = rfft(values * damping, self._length)
+        self._undamping = {(1, self._n): np.divide(1, damping, out=damping)}
+        # (sigma + 2j pi k / length) rate, in place
+        self._s = 2j * np.pi * np.arange(self._length // 2 + 1)
+        self._s /= self._length
+        self._s += self._sigma
+        self._s *= rate
         ramp = np.linspace(0, 1, len(self._s) - int((1 - _TURNED) * len(self._s)))
         self._ramp = ramp * ramp * (3 - 2 * ramp)
 

@@ -26,6 +26,8 @@ _MOST_STEPS_PER_SAMPLE = 64
 _PATH_STEPS = 16
 # With fewer steps the modes of a fractional memory need not be finer.
 _FEW_STEPS = 4
+# Frequencies at which links are evaluated at a time.
+_BLOCK = 65536
 # Samples that a response between samples needs after the last one.
 _BEYOND = 8
 
@@ -351,8 +353,11 @@ def _static_gain(transfer):
 def _product(links, s):
     """Composite transfer function of some links."""
     total = np.ones(len(s), complex)
-    for link in links:
-        total *= link.transfer_function(s)
+    # by blocks, of which temporary values are small
+    for start in range(0, len(s), _BLOCK):
+        lines = slice(start, start + _BLOCK)
+        for link in links:
+            total[lines] *= link.transfer_function(s[lines])
     return total
 
 

@@ -114,7 +114,16 @@ def _middles(motion):
     padded = np.pad(motion, ((0, 0), (2, 2)), mode="reflect", reflect_type="odd")
     count = motion.shape[1] - 1
     f = [padded[:, i:i + count] for i in range(6)]
-    return (150 * (f[2] + f[3]) - 25 * (f[1] + f[4]) + 3 * (f[0] + f[5])) / 256
+    # (150 (f2 + f3) - 25 (f1 + f4) + 3 (f0 + f5)) / 256, with as few arrays as that takes
+    total, pair = f[2] + f[3], f[1] + f[4]
+    total *= 150
+    pair *= 25
+    total -= pair
+    np.add(f[0], f[5], out=pair)
+    pair *= 3
+    total += pair
+    total /= 256
+    return total
 
 
 @_inlined

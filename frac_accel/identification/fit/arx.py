@@ -134,7 +134,8 @@ class ArxStructure:
         return fit.core()
 
 
-def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=None):
+def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=None,
+            uncertainty=True):
     r"""Coefficients of a rational transfer function in z, with a whole delay and an offset.
 
     Minimises the sum of the squared differences between the measured output and
@@ -165,6 +166,8 @@ def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=No
         Time by which the sensor's instants are later than the reference's.
     start : tuple, optional
         `ArxFit.unknowns` of a fit whose orders are to be kept.
+    uncertainty : bool
+        Whether the covariance is wanted; NaN otherwise.
 
     Returns
     -------
@@ -191,7 +194,7 @@ def fit_arx(reference, sensor, sampling_rate_hz, valid=None, lag_s=0.0, start=No
     record = _Record(reference, sensor, valid, orders)
     problem = record.problem(orders)
     theta, _ = problem.search(coefficients)
-    return _result(record, problem, orders, theta, sampling_rate_hz, lag_s)
+    return _result(record, problem, orders, theta, sampling_rate_hz, lag_s, uncertainty)
 
 
 def least_squares(reference, sensor, orders):
@@ -400,16 +403,17 @@ class _Problem:
 
     def slopes(self, output, denominator=None):
         """Derivatives of the model by theta where its output is `output`, shape (p, rows)."""
-        signals = np.concatenate([self.inputs, np.zeros((1, self.rows))])
-        signals[-1, 0] = 1
-        if denominator is not None:
-            signals = lfilter([1], denominator, signals, axis=1)
+        def filtered(row):
+            return row if denominator is None else lfilter([1], denominator, row)
         slopes = np.zeros((2 * self.poles + len(self.inputs), self.rows))
         self.put_past(slopes, output, denominator)
         initial = self.poles + len(self.inputs)
-        slopes[self.poles:initial] = signals[:-1]
+        # one after the other: of a long record, copies of all would take most memory
+        for row, values in zip(slopes[self.poles:initial], self.inputs):
+            row[:] = filtered(values)
+        impulse = filtered(np.eye(1, self.rows)[0])
         for i in range(self.poles):
-            slopes[initial + i, i:] = signals[-1, :self.rows - i]
+            slopes[initial + i, i:] = impulse[:self.rows - i]
         return slopes
 
     def put_past(self, slopes, output, denominator):
@@ -442,11 +446,11 @@ class _Problem:
         cost, error, output, denominator = self.evaluate(theta)
         for _ in range(iterations):
             slopes = self.slopes(output, denominator)
-            right, size = slopes @ error, np.sum(slopes**2, axis=1)
+            right, size = slopes @ error, np.einsum("ij,ij->i", slopes, slopes)
             found = self.descend(theta, solve(self.refined(slopes, output, denominator), right,
                                               size, _SINGULAR), cost)
             if found is None:
-                own = slopes[:, self.used]
+                own = slopes if self.used.all() else slopes[:, self.used]
                 found = self.descend(theta, solve(own @ own.T, right, size, _SINGULAR),
                                      cost)
             if found is None:
@@ -459,9 +463,10 @@ class _Problem:
 
     def refined(self, slopes, output, denominator):
         """Matrix of the refined instrumental variables: instruments by measured regressors."""
-        regressors = slopes.copy()
-        self.put_past(regressors, np.where(self.used, self.sensor, output), denominator)
-        return slopes @ regressors.T
+        # only the past of the output differs from the slopes
+        past = np.zeros((self.poles, self.rows))
+        self.put_past(past, np.where(self.used, self.sensor, output), denominator)
+        return np.hstack([slopes @ past.T, slopes @ slopes[self.poles:].T])
 
     def descend(self, theta, step, cost):
         """Longest of the step's halvings that lowers the cost, and what it leads to."""
@@ -478,13 +483,19 @@ class _Problem:
         return float(error @ error), error, output, denominator
 
 
-def _result(record, problem, orders, theta, rate, lag_s):
+def _result(record, problem, orders, theta, rate, lag_s, uncertainty):
     output, denominator = problem.simulate(theta)
     residual = (problem.sensor - output)[problem.used]
-    gradient = problem.slopes(output, denominator)[:, problem.used].T
-    # initial motion that is over at once determines its coefficients badly, and nothing else
-    gradient = gradient[:, np.linalg.norm(gradient, axis=0) > 0]
-    covariance = sandwich(gradient, residual, problem.used)
+    if uncertainty:
+        gradient = problem.slopes(output, denominator)
+        if not problem.used.all():
+            gradient = gradient[:, problem.used]
+        # initial motion that is over at once determines its coefficients badly, and nothing else
+        felt = np.any(gradient, axis=1)
+        covariance = sandwich((gradient if felt.all() else gradient[felt]).T, residual,
+                              problem.used)
+    else:
+        covariance = np.full((len(theta),) * 2, np.nan)
     a, b, _ = problem.split(theta)
     b, constant = b[:-1], b[-1]
     # offset = mean output + c / A(1) - B(1) / A(1) * mean input, and its derivatives

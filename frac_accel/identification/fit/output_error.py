@@ -2,12 +2,14 @@
 
 import dataclasses
 import functools
+from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import rfft
 
 from ...errors import IdentificationError
 from ...signals.convolution import Convolution
+from ...signals.kept import kept
 from ...signals.normal_equations import solve
 from ..response.excitation import strongest_stretch
 from ..response.frequency_response import averaged_response, bulk_delay, phase_delay
@@ -44,6 +46,10 @@ _HALF_AWAY = 4
 # Distance of the logarithms of frequencies that count as one.
 _BESIDE = 1e-9
 _START_LENGTH = 16384
+# Stretch of a record several times as long on which the search goes on before it sees all of it.
+_MIDDLE_LENGTH, _MUCH_LONGER = 1 << 17, 2
+# Lines of the responses that are evaluated at a time.
+_LINES = 1 << 15
 _TRIAL_ITERATIONS = 5
 # Share of the output's power, times the number of independent frequencies, that the best of all
 # resonances and delays still explains of an unrelated signal.
@@ -70,8 +76,8 @@ class Fit:
         Where the search ended, in its own coordinates.
     at_bounds : tuple of str
         The structure's parameters with which it ended at a bound of the search.
-    gradient : ndarray, shape (p - 1, m), or None
-        Derivatives of the output by all parameters but the offset, at the m samples that count.
+    gradient : ndarray, shape (p - 1, n), or None
+        Derivatives of the output by all parameters but the offset; 0 where not judged.
     free_share : float
         Power of the free swing that began before the record, of the output's.
     fastest_decay : float
@@ -154,6 +160,7 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
     IdentificationError
         If the best model explains no more than chance would.
     """
+    very_long = start is None and len(sensor) > _MUCH_LONGER * _MIDDLE_LENGTH
     if start is None:
         # where the motion is strongest is enough to find out roughly where the parameters are
         part = strongest_stretch(reference, _START_LENGTH, valid)
@@ -169,8 +176,16 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
         if rough.n == len(sensor):
             return rough.result(state, uncertainty)
         start = state.theta
+        if very_long:
+            # a search is dear on all samples, where it then has little left to do
+            part = strongest_stretch(reference, _MIDDLE_LENGTH, valid)
+            start = _Problem(structure, reference[part], sensor[part], sampling_rate_hz,
+                             None if valid is None else valid[part], lag_s).solve([start]).theta
     problem = _Problem(structure, reference, sensor, sampling_rate_hz, valid, lag_s, held)
     state = problem.solve([start])
+    if very_long and structure.names and problem.explained(state) < _POOR:
+        # a long sweep is loudest in a band that may have led astray
+        state = min(state, problem.solve(problem.starts()), key=lambda state: state.cost)
     problem.require_relation(state)
     return problem.result(state, uncertainty)
 
@@ -187,9 +202,11 @@ class _Problem:
         way = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, _WAY, endpoint=False))
         moving = np.r_[way * (reference[0] - self.level), reference - self.level]
         self.convolution = Convolution(moving, rate, 2 * _EDGE / rate)
-        self.prepared = structure.prepare(self.convolution.s)
-        # derivative of a delay by one sample
-        self.shift = -self.convolution.s / rate
+        s = self.convolution.s
+        # by blocks, of which temporary values are small
+        self.blocks = [slice(at, at + _LINES) for at in range(0, len(s), _LINES)]
+        self.prepared = [structure.prepare(s[lines]) for lines in self.blocks]
+        self.rows_of = {}
         edge = min(_EDGE, self.n // 8)
         used = np.ones(self.n, bool) if valid is None else valid.copy()
         used[:edge] = used[-edge:] = False
@@ -289,16 +306,12 @@ class _Problem:
         return starts[:self.structure.trials]
 
     def rows(self, theta):
-        """Simulated output, constant, free motions and derivatives by theta, one in each row.
+        """`_Rows` at a place in the search, of which the last is kept; of short records, three."""
+        return kept(self.rows_of, theta.tobytes(), self._rows, theta,
+                    most=1 if self.n > _MIDDLE_LENGTH else 3)
 
-        Besides, their number without the derivatives, the free swing and its pole's derivatives.
-        """
+    def _rows(self, theta):
         own, delay = theta[:-1], theta[-1] / self.rate - self.lag_s
-        s = self.convolution.s
-        response, slopes = self.structure.gradient(self.prepared, own)
-        spectra = np.array([response, *slopes, response * self.shift])
-        spectra *= _exponential(-s[0] * delay, -(s[1] - s[0]) * delay, len(s))
-        simulated = self.convolution.response(spectra)[:, _WAY:][:, self.judged]
         # one that is over long before the first used sample is none
         decays = [np.exp(-rate * self.instants)
                   for rate in self.structure.decay_rates(own, self.instants[-1])
@@ -307,8 +320,48 @@ class _Problem:
         rings = pole is not None and pole.real * self.instants[0] > _OVER
         swing = _exponential(0.0, pole / self.rate, self.n)[self.judged] if rings else None
         free = [swing.real, swing.imag, *decays] if rings else decays
-        rows = np.array([simulated[0], np.ones(len(self.sensor)), *free, *simulated[1:]])
-        return rows, 2 + len(free), swing, pole_slopes
+        count = 2 + len(free)
+        transfers = self.transfers(own, delay)
+        # with room for what `result` may add
+        room = np.empty((count + len(transfers) + 1, len(self.sensor)))
+        rows = room[:-2]
+        rows[1] = 1.0
+        for row, values in zip(rows[2:], free):
+            row[:] = values
+        for place in (0, *range(count, len(rows))):
+            simulated = self.convolution.response(transfers.pop(0))
+            rows[place] = simulated[_WAY:][self.judged]
+        known = rows[:count]
+        # what was over before the first used sample fades out of the fit instead of dropping out
+        faint = np.diag(np.r_[0.0, 0.0, np.full(count - 2, _FAINT**2)])
+        gram = known @ known.T
+        linear = solve(gram + faint, known @ self.sensor)
+        residual = self.sensor - linear @ known
+        noise = residual @ residual / len(residual)
+        swung = linear[2:4] if rings else np.zeros(0)
+        energy = swung @ gram[2:2 + len(swung), 2:2 + len(swung)] @ swung
+        mean = swung @ gram[1, 2:2 + len(swung)] / len(residual)
+        real = energy > _FEIGNED * noise
+        if real:
+            # with the pole, what it left behind changes as well; what noise feigns of it does not
+            change = (linear[2] - 1j * linear[3]) / linear[0] * self.instants * swing
+            for row, slope in zip(rows[count:-1], pole_slopes):
+                row += (slope * change).real
+        return _Rows(room, rows, linear, faint, residual, swing, bool(real),
+                     float((energy / len(residual) - mean**2) / self.size**2))
+
+    def transfers(self, own, delay):
+        """Responses that give the simulated output, and its derivatives by theta, as a list."""
+        s = self.convolution.s
+        turn = _exponential(-s[0] * delay, -(s[1] - s[0]) * delay, len(s))
+        found = [np.empty(len(s), complex) for _ in range(len(own) + 2)]
+        for lines, prepared in zip(self.blocks, self.prepared):
+            response, slopes = self.structure.gradient(prepared, own)
+            # last the derivative of a delay by one sample
+            for values, part in zip(found, (response, *slopes, response * (-1 / self.rate)
+                                            * s[lines])):
+                np.multiply(part, turn[lines], out=values[lines])
+        return found
 
     def search(self, theta, iterations):
         """Levenberg-Marquardt from `theta`; the last state."""
@@ -356,14 +409,15 @@ class _Problem:
         Geodesic acceleration for narrow curved valleys (M. Transtrum, J. Sethna,
         arXiv:1201.5885).
         """
-        ahead = self.state(np.clip(state.theta + _AHEAD * step, self.low, self.high))
+        here = self.rows(state.theta)
+        ahead = self.rows(np.clip(state.theta + _AHEAD * step, self.low, self.high))
         count = len(state.linear)
-        slopes = state.linear[0] * state.rows[count:]
-        known = state.rows[:count]
+        slopes = state.linear[0] * here.rows[count:]
+        known = here.rows[:count]
         gram = state.gram[:count, :count]
         straight = step @ slopes
         straight -= solve(gram, known @ straight) @ known
-        curved = 2 / _AHEAD * ((ahead.residual - state.residual) / _AHEAD + straight)
+        curved = 2 / _AHEAD * ((ahead.residual - here.residual) / _AHEAD + straight)
         curved -= solve(gram, known @ curved) @ known
         scale = np.sqrt(np.diag(matrix))
         bend = np.where(step == 0, 0.0, 0.5 * solve(matrix, slopes @ curved))
@@ -371,24 +425,12 @@ class _Problem:
         return bend if small else np.zeros(len(step))
 
     def state(self, theta):
-        rows, count, swing, pole_slopes = self.rows(theta)
-        known = rows[:count]
-        # what was over before the first used sample fades out of the fit instead of dropping out
-        faint = np.diag(np.r_[0.0, 0.0, np.full(count - 2, _FAINT**2)])
-        linear = solve(known @ known.T + faint, known @ self.sensor)
-        residual = self.sensor - linear @ known
-        noise = residual @ residual / len(residual)
-        real = swing is not None and np.sum((linear[2:4] @ known[2:4])**2) > _FEIGNED * noise
-        if real:
-            # with the pole, what it left behind changes as well; what noise feigns of it does not
-            change = (linear[2] - 1j * linear[3]) / linear[0] * self.instants * swing
-            rows[count:-1] += np.outer(pole_slopes.real, change.real)
-            rows[count:-1] -= np.outer(pole_slopes.imag, change.imag)
+        found = self.rows(theta)
+        rows, linear = found.rows, found.linear
         gram, right = rows @ rows.T, rows @ self.sensor
-        gram[:count, :count] += faint
-        cost = residual @ residual + linear @ faint @ linear
-        return _State(theta, float(cost), linear, rows, residual, gram, right,
-                      swing, real)
+        gram[:len(linear), :len(linear)] += found.faint
+        cost = found.residual @ found.residual + linear @ found.faint @ linear
+        return _State(theta, float(cost), linear, gram, right, found.free_share)
 
     def explained(self, state):
         """Share of the output's power."""
@@ -441,28 +483,38 @@ class _Problem:
         held = self.low == self.high
         stuck = ((theta <= self.low) | (theta >= self.high)) & ~held
         gradient, decay, second_order = None, np.nan, 0.0
+        found = self.rows(theta)
+        residual = found.residual
         if uncertainty:
-            jacobian = state.rows.copy()
+            # changed in place, and never asked for again, as is what they were made with
+            jacobian = found.rows
+            self.rows_of.clear()
+            self.convolution = self.prepared = None
             # the offset is what remains with the whole reference, not with the part that moves
             jacobian[0] += self.level
             jacobian[count:] *= linear[0]
-            jacobian[count:-1] = np.linalg.solve(factors.T, jacobian[count:-1])
+            jacobian[count:-1] = np.linalg.inv(factors.T) @ jacobian[count:-1]
             jacobian[-1] *= self.rate
             # sensitivity, structure, delay, offset, free motions
-            gradient = jacobian[[0, *range(count, len(jacobian))]]
+            gradient = np.zeros((1 + len(jacobian) - count, self.n))
+            for row, place in zip(gradient, (0, *range(count, len(jacobian)))):
+                row[self.judged] = jacobian[place]
             order = [0, *(count + np.flatnonzero(~held)), *range(1, count)]
-            jacobian = jacobian[order]
-            if state.swing is not None and (stuck.any() or not state.real):
+            if found.swing is not None and (stuck.any() or not found.real):
                 # what noise, or a tone that never decays, can feign of a swing tells no frequency
-                longer = self.instants * state.swing
-                jacobian = np.concatenate([jacobian, [longer.real, longer.imag]])
+                order += [len(jacobian), len(jacobian) + 1]
+                jacobian = found.room
+                np.multiply(self.instants, found.swing.real, out=jacobian[-2])
+                np.multiply(self.instants, found.swing.imag, out=jacobian[-1])
+            if held.any():
+                jacobian, order = jacobian[order], range(len(order))
             free = np.flatnonzero(np.r_[True, ~held, True])
-            within = sandwich(jacobian.T, state.residual, self.used)
+            within = sandwich(jacobian.T, residual, self.used)
             if stuck.any():
                 # the bound is ours, not the sensor's: how far the data would go is not known better
-                gram, right = jacobian @ jacobian.T, jacobian @ state.residual
-                beyond = solve(gram, right)
+                beyond = solve(jacobian @ jacobian.T, jacobian @ residual)
                 within += np.outer(beyond, beyond)
+            within = within[np.ix_(order, order)]
             covariance = np.zeros_like(covariance)
             covariance[np.ix_(free, free)] = within[:len(free), :len(free)]
             place = slice(1, 1 + len(own))
@@ -474,7 +526,7 @@ class _Problem:
                 variance = slopes.real @ spread @ slopes.real
                 decay = 2 * np.sqrt(max(variance, 0)) - pole.real
         full = np.full(self.n, np.nan)
-        full[self.used] = state.residual
+        full[self.used] = residual
         offset = linear[1] - linear[0] * self.level
         values = np.r_[linear[0], own, theta[-1] / self.rate, offset]
         at_bounds = tuple(name for name, here in zip((*self.structure.names, "delay_s"), stuck)
@@ -483,31 +535,48 @@ class _Problem:
                    float(decay), second_order=second_order)
 
 
+class _Rows(NamedTuple):
+    """What a place in the search makes of all samples; not kept, as its rows are long.
+
+    Attributes
+    ----------
+    room : ndarray, shape (p + 2, m)
+        The rows, and two more that are free.
+    rows : ndarray, shape (p, m)
+        Simulated output, constant, free motions and derivatives by theta.
+    linear : ndarray
+        Coefficients of those before the derivatives.
+    faint : ndarray
+        What is known of them besides, as a normal matrix.
+    residual : ndarray, shape (m,)
+    swing : ndarray of complex, shape (m,), or None
+    real : bool
+        Whether the swing is more than noise could feign.
+    free_share : float
+        Power of the free swing, of the output's; beside a forced one, it may exceed 1.
+    """
+
+    room: np.ndarray
+    rows: np.ndarray
+    linear: np.ndarray
+    faint: np.ndarray
+    residual: np.ndarray
+    swing: np.ndarray | None
+    real: bool
+    free_share: float
+
+
 @dataclasses.dataclass(frozen=True)
 class _State:
-    """A place in the search: rows as in `_Problem.rows`, the first of them with coefficients.
-
-    Besides, the free swing, and whether it is more than noise could feign.
-    """
+    """A place in the search, by its normal equations."""
 
     theta: np.ndarray
     cost: float
     linear: np.ndarray
-    rows: np.ndarray
-    residual: np.ndarray
     gram: np.ndarray
     right: np.ndarray
-    swing: np.ndarray | None
-    real: bool
+    free_share: float
     converged: bool = False
-
-    @property
-    def free_share(self):
-        """Power of the free swing, of the output's; beside a forced one, it may exceed 1."""
-        if self.swing is None:
-            return 0.0
-        measured = self.linear @ self.rows[:len(self.linear)] + self.residual
-        return float(np.var(self.linear[2:4] @ self.rows[2:4]) / np.var(measured))
 
     def reduced(self):
         """Normal matrix and slope of the unknowns, the linear coefficients eliminated."""

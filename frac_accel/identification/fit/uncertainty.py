@@ -16,6 +16,8 @@ _BEYOND = 0.2
 _BLOCKS = 40
 # Share of the blocks that are quiet.
 _QUIET = 0.05
+# Lines of the spectra that are multiplied at a time.
+_BLOCK = 1 << 15
 
 
 def sandwich(jacobian, residual, used):
@@ -37,23 +39,21 @@ def sandwich(jacobian, residual, used):
     ndarray, shape (p, p)
         Huge, not small, for what the data leave open.
     """
-    scale = np.linalg.norm(jacobian, axis=0)
-    scaled = (jacobian / scale).T
-    rows = np.concatenate([scaled, residual[None]])
-    first, last = np.flatnonzero(used)[[0, -1]]
-    # where the rows begin turns all spectra alike; only gaps need their place
-    if last + 1 - first > len(residual):
-        rows, present = np.zeros((len(rows), len(used))), rows
-        rows[:, used] = present
+    gram = jacobian.T @ jacobian
+    scale = np.sqrt(np.diag(gram))
     # the smoothed spectrum reaches over lags of a few times the root of the record
     length = next_fast_len(len(used) + int(_REACH * np.sqrt(len(used))), real=True)
-    spectra = rfft(rows, length, axis=1)
-    power = spectra[-1].real**2 + spectra[-1].imag**2
-    values, vectors = np.linalg.eigh(scaled @ scaled.T)
+    spectra = _spectra(jacobian.T, scale, used, length)
+    power = np.square(np.abs(_spectra(residual[None], np.ones(1), used, length)[0]))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     root = vectors / np.sqrt(np.maximum(values, 1e-14 * values[-1]))
-    fitted = root.T @ spectra[:-1]
     # what a fit to white noise leaves of each line
-    left = len(residual) - np.sum(np.square(fitted.view(float)), axis=0).reshape(-1, 2).sum(axis=1)
+    left = np.empty(len(power))
+    # by blocks: of a long record, copies of all spectra would take most memory
+    blocks = [slice(start, start + _BLOCK) for start in range(0, len(power), _BLOCK)]
+    for lines in blocks:
+        spectra[:, lines] = fitted = root.T @ spectra[:, lines]
+        left[lines] = len(residual) - np.sum(fitted.real**2 + fitted.imag**2, axis=0)
     width = max(5, int(len(power) / np.sqrt(len(used))))
     power, left = (uniform_filter1d(v, width, mode="reflect") for v in (power, left))
     smooth = power / np.maximum(left, _LEAST * len(residual))
@@ -61,11 +61,29 @@ def sandwich(jacobian, residual, used):
     twice[0] = 1.0
     if length % 2 == 0:
         twice[-1] = 1.0
-    weighted = (fitted * np.sqrt(twice * smooth)).view(float)
+    middle = np.zeros((len(scale), len(scale)))
+    for lines in blocks:
+        weighted = (spectra[:, lines] * np.sqrt(twice[lines] * smooth[lines])).view(float)
+        middle += weighted @ weighted.T
     # as a square, so that rounding makes no variance negative
-    strengths, directions = np.linalg.eigh(weighted @ weighted.T / length)
+    strengths, directions = np.linalg.eigh(middle / length)
     root = root @ (directions * np.sqrt(np.maximum(strengths, 0))) / scale[:, None]
     return root @ root.T
+
+
+def _spectra(rows, scale, used, length):
+    """Spectra of rows over their sizes, put where `used` is, shape (p, length // 2 + 1)."""
+    first, last = np.flatnonzero(used)[[0, -1]]
+    spectra = np.empty((len(rows), length // 2 + 1), complex)
+    for spectrum, row, size in zip(spectra, rows, scale):
+        row = row / size
+        # where the rows begin turns all spectra alike; only gaps need their place
+        if last + 1 - first > len(row):
+            placed = np.zeros(len(used))
+            placed[used] = row
+            row = placed
+        spectrum[:] = rfft(row, length)
+    return spectra
 
 
 def by_blocks(jacobian, residual):

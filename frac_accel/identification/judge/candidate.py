@@ -76,7 +76,7 @@ class Data:
         record = (self.reference[part], self.sensor[part], self.pair.sampling_rate_hz,
                   self.pair.valid[part], self.pair.lag_s)
         if isinstance(structure, ArxStructure):
-            return fit_arx(*record, start)
+            return fit_arx(*record, start, uncertainty)
         hint = self.response.start(structure) if start is None else None
         if self.response.stepped and hint is not None:
             start, hint = hint, None

@@ -28,11 +28,24 @@ _SETTLING = 7.0
 _EDGE = 32
 
 
+class _Fitted(dict):
+    """Candidates of one record by the names of their structures, each fitted once."""
+
+    def __init__(self, data):
+        super().__init__()
+        self.data = data
+
+    def __missing__(self, name):
+        self[name] = Candidate.of(name, self.data)
+        return self[name]
+
+
 def choose(data):
     """Best of the structures for one record, and why."""
-    flat = flat_instead(data)
+    candidates = _Fitted(data)
+    flat = _flat_instead(candidates)
     chosen, best, reason = (flat[0], flat[0].held_out_nrmse, flat[1]) if flat \
-        else _choose_oscillator(data)
+        else _choose_oscillator(candidates)
     if linear_share(data.reference, chosen.fit.residual) < 1 - _CLEARLY**2:
         return chosen, reason
     try:
@@ -50,24 +63,25 @@ def choose(data):
 
 def choose_classical(data):
     """A gain where the record shows no resonance, otherwise an oscillator, and why."""
-    return flat_instead(data) or (Candidate.of("oscillator", data), "a resonance shows")
+    candidates = _Fitted(data)
+    return _flat_instead(candidates) or (candidates["oscillator"], "a resonance shows")
 
 
-def flat_instead(data):
+def _flat_instead(candidates):
     """A gain and why, or None where the record shows the resonance of an oscillator.
 
     Whatever else makes fast motion smaller, such as a smoothed reference, bends a resonance out
     there to its liking; it is believed only where it predicts clearly better.
     """
     try:
-        flat = Candidate.of("gain", data)
-        classical = Candidate.of("oscillator", data)
+        classical = candidates["oscillator"]
+        data, resonance = candidates.data, classical.fit["natural_frequency_hz"]
+        std = classical.fit.std[classical.fit.names.index("natural_frequency_hz")]
+        highest = excited_band(data.reference, data.sensor, data.pair.sampling_rate_hz)[1]
+        if resonance < _IN_SIGHT * highest and std < _UNDETERMINED * resonance:
+            return None
+        flat = candidates["gain"]
     except IdentificationError:
-        return None
-    resonance = classical.fit["natural_frequency_hz"]
-    std = classical.fit.std[classical.fit.names.index("natural_frequency_hz")]
-    highest = excited_band(data.reference, data.sensor, data.pair.sampling_rate_hz)[1]
-    if resonance < _IN_SIGHT * highest and std < _UNDETERMINED * resonance:
         return None
     delay, delay_std = (values[classical.fit.names.index("delay_s")]
                         for values in (classical.fit.values, classical.fit.std))
@@ -110,14 +124,14 @@ def choose_of_several(structure, datas, records):
     return better, reason, fractionally if better is fractional else agreeing
 
 
-def _choose_oscillator(data):
+def _choose_oscillator(candidates):
     """The better of classical and fractional, the smallest held-out residual, and why."""
-    classical = Candidate.of("oscillator", data)
+    classical = candidates["oscillator"]
     try:
-        fractional = Candidate.of("fractional", data)
+        fractional = candidates["fractional"]
     except IdentificationError as error:
         return classical, classical.held_out_nrmse, f"no fractional model: {error}"
-    chosen, reason = _preferred(classical, fractional, [data], "held-out residual")
+    chosen, reason = _preferred(classical, fractional, [candidates.data], "held-out residual")
     return chosen, min(classical.held_out_nrmse, fractional.held_out_nrmse), reason
 
 

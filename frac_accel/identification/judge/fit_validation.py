@@ -118,12 +118,9 @@ def judge_residual(core, fit, reference, pair):
     reference : ndarray, shape (n,)
     pair : Record
     """
-    used = np.isfinite(fit.residual)
-    if fit.gradient is None:
+    gradient = fit.gradient
+    if gradient is None:
         gradient = _gradient(core, fit, reference, pair)
-    else:
-        gradient = np.zeros((len(fit.gradient), len(used)))
-        gradient[:, used] = fit.gradient
     try:
         return residual_tests(fit.residual, reference, pair.valid, gradient)
     except FracAccelError:

@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import lfilter
 from scipy.special import chdtrc, ndtri
 
@@ -20,6 +21,8 @@ _FEWEST = 10 * LAGS
 _EXCITED = 1e-4
 _FREE = 0.05
 _BLOCK = 16384
+# Share that is left of a noise model's memory where it counts as none.
+_FORGOTTEN = 1e-12
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -218,14 +221,13 @@ def _moments(error, reference, used, lags, gradient, noise):
     """
     n = len(error)
     denominator, variance = noise
-    others = np.ones((1, n))
-    if gradient is not None:
-        size = np.maximum(np.max(gradient, axis=1), -np.min(gradient, axis=1))
-        others = np.concatenate([others, gradient / np.maximum(size, 1e-300)[:, None]])
+    others = [np.ones(n), *([] if gradient is None else gradient)]
     edges = _edges(used)
-    if len(denominator) == 1 and len(edges) == 2:
-        gram, right = _white_moments(error, reference, edges, lags, others)
-        return gram, variance * gram, right
+    if len(edges) == 2:
+        stretch = _Stretch(error, reference, edges, lags, others)
+        gram, right = stretch.gram(np.array([1.0, 0.0]), None), stretch.right()
+        coloured = gram if len(denominator) == 1 else stretch.gram(*_autoregressive(denominator, n))
+        return gram, variance * coloured, right
     width = len(lags) + len(others)
     gram, coloured, right = np.zeros((width, width)), np.zeros((width, width)), np.zeros(width)
     reach = lags[-1]
@@ -235,7 +237,7 @@ def _moments(error, reference, used, lags, gradient, noise):
         start = max(0, stop - _BLOCK)
         columns = np.concatenate(
             [padded[start + reach - lags[:, None] + np.arange(stop - start)].T,
-             others[:, start:stop].T], axis=1)
+             np.array([row[start:stop] for row in others]).T], axis=1)
         # without the lags that reach out of the record, every column is zero there by padding
         columns *= used[start:stop, None]
         gram += columns.T @ columns
@@ -257,29 +259,72 @@ def _edges(used):
     return np.flatnonzero(np.diff(used, prepend=False, append=False))
 
 
-def _white_moments(error, reference, edges, lags, others):
-    """X'X and X'error of one stretch, from `edges[0]` to `edges[1]`, without building X.
+def _autoregressive(denominator, n):
+    """Autocovariance of 1/A(z) driven by white noise, and its product with rows, as functions.
 
-    Of the reference at two lags, the product differs from that at both lags one longer by the
-    samples at the ends.
+    Of n samples, and over twice as many at most: what wraps around has decayed there.
     """
-    start, stop = edges
-    count, reach = len(lags), lags[-1] + 1
-    padded = np.r_[np.zeros(reach), reference, np.zeros(reach)]
+    slowest = np.max(np.abs(np.roots(denominator)))
+    memory = min(int(np.log(_FORGOTTEN) / np.log(slowest)) + 1, n) if 0 < slowest < 1 else n
+    length = next_fast_len(n + memory, real=True)
+    power = 1 / np.square(np.abs(rfft(denominator, length)))
 
-    def shifted(lag):
-        return padded[reach - lag + start:reach - lag + stop]
-    rows = np.concatenate([others[:, start:stop], [error[start:stop], shifted(lags[0])]])
-    across = np.array([rows @ shifted(lag) for lag in lags])
-    gram = np.empty((count + len(others),) * 2)
-    before, last = (padded[reach - lags + place - 1] for place in edges)
-    change = np.outer(before, before) - np.outer(last, last)
-    gram[0, :count] = gram[:count, 0] = across[:, -1]
-    for i in range(1, count):
-        gram[i, 1:count] = gram[i - 1, :count - 1] + change[i - 1, :-1]
-    gram[:count, count:], gram[count:, :count] = across[:, :-2], across[:, :-2].T
-    gram[count:, count:] = rows[:-2] @ rows[:-2].T
-    return gram, np.r_[across[:, -2], rows[:-2] @ rows[-2]]
+    def weigh(row):
+        return irfft(rfft(row, length) * power, length)[:len(row)]
+    return irfft(power, length)[:memory + 1], weigh
+
+
+class _Stretch:
+    """X of `_moments` for one stretch of samples without gaps, without building it."""
+
+    def __init__(self, error, reference, edges, lags, others):
+        self.start, self.stop = edges
+        self.reach, self.lags = lags[-1] + 1, lags
+        self.padded = np.r_[np.zeros(self.reach), reference, np.zeros(self.reach)]
+        *self.others, self.error = (row[self.start:self.stop] for row in (*others, error))
+
+    def shifted(self, lag, first=0, last=None):
+        """Reference at a lag, at the stretch's samples from `first` to before `last`."""
+        begin = self.reach - lag + self.start
+        return self.padded[begin + first:begin + (self.stop - self.start if last is None else last)]
+
+    def right(self):
+        """X'error."""
+        return np.array([*(self.error @ self.shifted(lag) for lag in self.lags),
+                         *(self.error @ row for row in self.others)])
+
+    def gram(self, covariance, weigh):
+        """X'C X with noise of some covariance by lags (`weigh`: its product with a row).
+
+        Of the reference at two lags, the product differs from that at both lags one longer by the
+        samples at the ends.
+        """
+        count, length = len(self.lags), self.stop - self.start
+        gram = np.empty((count + len(self.others),) * 2)
+        # one after the other: of a long record, all weighed rows would take most memory
+        for place, row in enumerate(self.others, count):
+            weighed = row if weigh is None else weigh(row)
+            gram[:count, place] = [weighed @ self.shifted(lag) for lag in self.lags]
+            gram[place, count:] = [weighed @ other for other in self.others]
+        gram[count:, :count] = gram[:count, count:].T
+        first = self.shifted(self.lags[0])
+        weighed = first if weigh is None else weigh(first)
+        gram[0, :count] = gram[:count, 0] = [weighed @ self.shifted(lag) for lag in self.lags]
+        before, last = (self.padded[self.reach - self.lags + place - 1]
+                        for place in (self.start, self.stop))
+        # the weighed reference a sample before the stretch, and at its last one
+        reach = min(len(covariance) - 1, length)
+        ahead = np.array([covariance[1:reach + 1] @ self.shifted(lag, 0, reach)
+                          for lag in self.lags])
+        behind = np.array([covariance[reach - 1::-1] @ self.shifted(lag, length - reach)
+                           for lag in self.lags])
+        change = np.outer(ahead, before) - np.outer(behind, last)
+        far = covariance[length] if length < len(covariance) else 0.0
+        change -= far * np.outer(before, last)
+        change += change.T + covariance[0] * (np.outer(before, before) + np.outer(last, last))
+        for i in range(1, count):
+            gram[i, 1:count] = gram[i - 1, :count - 1] + change[i - 1, :-1]
+        return gram
 
 
 def _autocovariance(error, used, most):

@@ -13,10 +13,10 @@ _MOST = 0.3
 _LOUDER = 3.0
 # Logarithm of the likelihood by which two noises must describe the residual better than one.
 _BETTER = 50.0
-# How many bursts there must be at least (of fewer nobody can tell that the motion has not made
-# them), and the chance that a sample after one that sticks out
-# does so too: spikes and heavy tails come alone.
-_FEWEST = 12
+# How many bursts there must be at least, how many where they make less than this share of what is
+# left (of few nobody can tell that the motion has not made them), and the chance that a sample
+# after one that sticks out does so too: spikes and heavy tails come alone.
+_FEWEST, _SEVERAL, _MOSTLY = 5, 12, 0.5
 _GOES_ON = 0.2
 # Correlation of the bursts, and of the error in them, with the motion, above which they are its: so
 # much more than chance gives, and at most so much.
@@ -68,7 +68,8 @@ class InterferenceBursts(Effect):
             return None
         inside = _in_bursts(error, noise, loud, share)
         starts = np.flatnonzero(np.diff(np.r_[0, inside.astype(int)]) == 1)
-        if len(starts) < _FEWEST or _going_on(error, noise) < _GOES_ON \
+        mostly = share * (loud - noise) > _MOSTLY * np.mean(error**2)
+        if len(starts) < (_FEWEST if mostly else _SEVERAL) or _going_on(error, noise) < _GOES_ON \
                 or _follows(inside, error, output, len(starts)) \
                 or _grows(error, output) > _AS_GOOD * better \
                 or _repeated(seen.measured[used], inside) > _REPEATED:
