@@ -36,6 +36,9 @@ _SLOW_PARTS, _SLOW_SHARE, _SLOW_TIMES = 20, 0.5, 6.0
 _BY_ITSELF = 0.5
 # Share of what a filter takes (RMS) below which a delay beside it may only mend it.
 _MENDS = 0.1
+# Share of what is left (RMS) below which an odd cause is too small where nothing shows that this is
+# noise: pairing, resampling and the reference's own errors come to as much.
+_LITTLE = 0.25
 # Filters that may be one of higher order: so many, or two with poles within such a factor.
 _SEVERAL, _NEAR = 3, 4.0
 # Times the power that is left by a set with filters which a set without them, and without a link of
@@ -70,6 +73,10 @@ def doubts_about(engine, best, gains, stds, left, noise):
             doubts.setdefault(cause, f"it changes the output by {there:.3g} RMS only: the rest of "
                                      f"what it explains ({gained:.3g} RMS) is a free motion "
                                      "of its own")
+        rest = engine.rms(best.residual)
+        if rms < _LITTLE * rest and noise.rms is None and not best.effects[cause].everyday:
+            doubts.setdefault(cause, f"it takes {rms:.3g} RMS only beside {rest:.3g} that are "
+                                     "left, which nothing shows to be noise")
         # noise makes nothing that changes with time
         if rms < AS_NOISE * own and not best.effects[cause].shows_with_time:
             doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) is no more than what the "

@@ -9,7 +9,7 @@ from scipy.special import expit
 from ..errors import FracAccelError
 from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel
-from ..model.effects import effect_of
+from ..model.effects import effect_of, known_effects
 from .doubts import by_what_is_left, doubts_about, left_open, resembles
 from .empirical import fit_empirical_link
 from .empirical_map import fit_empirical_map
@@ -191,6 +191,8 @@ def _examined(engine, best, noise_std, known):
             engine.established_noise(best, noise_std)):
         best = engine.plainer(best)
     best, gains = _relevant(engine, _mirrored(engine, best), known)
+    if _mirrored(engine, best) is not best:
+        best, gains = _relevant(engine, _mirrored(engine, best), known)
     best = engine.search.to_its_best(best)
     left = engine.left(best)
     noise = engine.established_noise(best, noise_std)
@@ -214,7 +216,14 @@ def _relevant(engine, best, known):
 
 
 def _mirrored(engine, best):
-    """The same set with causes that say the same with the other sign, where these were as good."""
+    """The same set with causes that say the same with the other sign, where these are as good."""
+    for cls in known_effects().values():
+        cause = cls.mirrors
+        if cause in best.effects and cause not in engine.search.base \
+                and cls.mirrored(best.effects[cause]) is not None:
+            # fitted, unless it is known
+            engine.search.fit_all([{**{c: e for c, e in best.effects.items() if c != cause},
+                                    cls.cause: cls.mirrored(best.effects[cause])}])
     for fit in engine.search.fits.values():
         turned = [effect.mirrors for cause, effect in fit.effects.items()
                   if cause not in best.effects]

@@ -135,6 +135,15 @@ class Record:
                   for topic in self.topics]
         return float(1e6 * np.hypot(*slopes))
 
+    @functools.cached_property
+    def lag_std_s(self):
+        """Standard uncertainty [s] that stamps leave to how late one topic is against the other:
+        their mean or median where they scatter, and of batches an instant within an interval."""
+        return float(np.hypot(*(
+            1 / (np.sqrt(12) * clock.rate_hz) if clock.kind == "batches"
+            else 1.25 * clock.scatter_s / np.sqrt(clock.independent_stamps(topic.stamps_ns))
+            for topic in self.topics or () for clock in [topic.clock]))) if self.topics else 0.0
+
     @property
     def is_reference_late(self):
         """Whether the sensor shows the motion clearly before the reference does."""

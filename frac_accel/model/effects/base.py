@@ -147,6 +147,11 @@ class Effect:
         """
         return [field.name for field in parameter_fields(cls) if is_varied(field)]
 
+    @classmethod
+    def mirrored(cls, effect):
+        """What says the same as an effect of the cause that this one `mirrors`, or None."""
+        return None
+
     def restated(self, core):
         """The core that says what this says beside another one; where `restates_core`."""
         return self.change_core(core)

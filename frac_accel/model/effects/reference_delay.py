@@ -31,6 +31,14 @@ class ReferenceDelay(Effect):
     def pure_delay_s(self):
         return -self.delay_s
 
+    def std_by_stamps(self, record):
+        return {"delay_s": record.lag_std_s}
+
+    @classmethod
+    def mirrored(cls, effect):
+        """The same as a sensor's delay below zero; None of one that a sensor has."""
+        return cls(-effect.delay_s) if effect.delay_s < 0 else None
+
     @classmethod
     def starts(cls, view):
         lag = bulk_shift(view.simulated, view.measured, view.used)

@@ -35,9 +35,7 @@ class TimeDelay(Effect):
         return Open(own, {"delay_s": std}) if std else None
 
     def std_by_stamps(self, record):
-        """Of samples in batches, nobody knows where within an interval they were taken."""
-        in_batches = any(topic.clock.kind == "batches" for topic in record.topics)
-        return {"delay_s": 1 / (np.sqrt(12) * record.sampling_rate_hz)} if in_batches else {}
+        return {"delay_s": record.lag_std_s}
 
     def pure_delay_s(self):
         return self.delay_s
