@@ -68,8 +68,7 @@ def description_words(described, unnamed):
         words = f"; the extended model has {' and '.join(described)}, which describes a part of " \
                 "it and names nothing"
     if unnamed:
-        words += f"; {' and '.join(unnamed)} stay in the extended model as identified, without a " \
-                 "name"
+        words += f"; the extended model keeps {' and '.join(unnamed)} as identified, without a name"
     return words
 
 
