@@ -10,7 +10,7 @@ from .base import CORE, Effect
 from .fit_starts import finite
 
 # Half width of the stretches over which a start is read off, in samples, and the largest asymmetry
-# that it begins with.
+# that it begins with, and that friction has.
 _SMOOTH = 2
 _LOPSIDED = 0.5
 
@@ -42,6 +42,10 @@ class FreeMassFriction(Effect):
     @classmethod
     def acts_on(cls, core):
         return isinstance(core, Gain)
+
+    def degenerate(self):
+        return "friction that is so much larger one way is mostly a constant force" \
+            if abs(self.asymmetry) > _LOPSIDED else None
 
     def transfer_function(self, s):
         return 1 / (1 + s / (2 * np.pi * self.corner_hz))
