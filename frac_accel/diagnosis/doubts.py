@@ -138,7 +138,7 @@ def by_what_is_left(engine, fitted, takes, left):
     """
     return {**_other_laws(engine, fitted, takes, left), **_elsewhen(engine, fitted, takes, left),
             **_imitators(engine, fitted, takes, left), **_on_both_sides(engine, fitted),
-            **_one_filter(engine, fitted)}
+            **_one_filter(engine, fitted), **_other_axes(engine, fitted, takes, left)}
 
 
 def left_open(engine, fitted, stds, causes):
@@ -266,6 +266,15 @@ def _one_filter(engine, best):
                 together |= {cause, other}
     return dict.fromkeys(together, "the filters " + ", ".join(sorted(together))
                          + " may be parts of one of higher order")
+
+
+def _other_axes(engine, best, takes, left):
+    """Causes that bring in the other axes beside which what is left still has much of these."""
+    share = sum(share for share, part in engine.structure(best) if part == "across")
+    rest = math.sqrt(share) * left.rms
+    return {cause: f"{share:.0%} of what is left comes from the other axes: they come in otherwise"
+            for cause, taken in takes.items()
+            if best.effects[cause].stage == CROSS_AXIS and taken < _RESEMBLES * rest}
 
 
 def _on_both_sides(engine, best):
