@@ -193,6 +193,7 @@ def test_every_command_is_here():
 @pytest.mark.parametrize("error", ["disk full", "memory"])
 def test_a_fleet_goes_on_from_any_write_that_fails(error, tmp_path, monkeypatch, capsys, failing):
     """What is done stays, nothing is half there, and the same command completes it."""
+    pytest.importorskip("pyarrow")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("TQDM_DISABLE", "1")
     write_bag("in.mcap", seeds.samples(np.random.default_rng(1)))
@@ -234,6 +235,8 @@ def test_a_fleet_goes_on_from_any_write_that_fails(error, tmp_path, monkeypatch,
                                     "new"])
 def test_a_disk_that_is_full_behind_any_library_leaves_nothing(output, tmp_path, monkeypatch):
     """Files may not grow beyond a size: libraries that do not write by Python are told so, too."""
+    pytest.importorskip("pyarrow")
+    pytest.importorskip("asammdf")
     monkeypatch.chdir(tmp_path)
     write_bag("in.mcap", seeds.samples(np.random.default_rng(1)))
     before = content(tmp_path)
