@@ -448,7 +448,10 @@ class Engine:
 
     def _learnt_of(self, fitted):
         part = self.problem.restricted(self.problem.used & ~self.held_out_rows)
-        return part.fit(fitted.effects, iterations=6, held=self.search.base)
+        try:
+            return part.fit(fitted.effects, iterations=6, held=self.search.base)
+        except FracAccelError:
+            return fitted  # the part's own motion has no bound: that of the whole record
 
     def predicts_better(self, fitted):
         """Whether a fit predicts the held-out part better than the model in use describes it."""
