@@ -11,7 +11,7 @@ from ..model.effects.base import CROSS_AXIS, OFFSET, Effect
 from .engine import LONG, WEIGHS
 from .names import cancelling, undetermined
 from .problem import Problem, acts_on_spring
-from .words import AS_NOISE, is_accounted
+from .words import AS_NOISE
 
 # Times the odd (even) part of what is left, in RMS, that an odd (even) cause must take.
 _LIKE_LAW = 30.0
@@ -62,7 +62,8 @@ def doubts_about(engine, best, gains, stds, left, noise):
     doubts = dict.fromkeys(engine.uncontested, "the time limit left no time for its rivals")
     doubts |= left_open(engine, best, stds, gains)
     takes = {cause: g.taken for cause, g in gains.items()}
-    own, added = engine.by_reference(best), {cause: engine.added(best, cause) for cause in gains}
+    own, rest = engine.by_reference(best), engine.rms(best.residual)
+    added = {cause: engine.added(best, cause) for cause in gains}
     for cause in gains:
         rms = min(takes[cause], engine.rms(added[cause]))
         # where it was judged: what comes and goes may do less elsewhere
@@ -73,7 +74,6 @@ def doubts_about(engine, best, gains, stds, left, noise):
             doubts.setdefault(cause, f"it changes the output by {there:.3g} RMS only: the rest of "
                                      f"what it explains ({gained:.3g} RMS) is a free motion "
                                      "of its own")
-        rest = engine.rms(best.residual)
         if rms < _LITTLE * rest and noise.rms is None and not best.effects[cause].everyday:
             doubts.setdefault(cause, f"it takes {rms:.3g} RMS only beside {rest:.3g} that are "
                                      "left, which nothing shows to be noise")
@@ -104,8 +104,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
     for cause, words in {**_parts_of_a_law(best, takes, added, left),
                          **_corrections(engine, best, takes)}.items():
         doubts.setdefault(cause, words)
-    spread = float(np.std(p.measured[p.used]))
-    if gains and (left.share > 0 or not is_accounted(engine.rms(best.residual), spread, noise)):
+    if gains and (left.share > 0 or not engine.is_accounted(best, noise)):
         for cause, words in engine.unstable(best).items():
             doubts.setdefault(cause, words)
     return {cause: words for cause, words in doubts.items() if cause in gains}
@@ -160,16 +159,16 @@ def _filters(engine, best):
             and (is_link(effect) or effect.pure_delay_s() or effect.restates_core)}
 
 
-def _linear_share(engine, fitted):
-    """Share of what a fit leaves that a linear filter would take; 0 where that is noise."""
-    return sum(share for share, part in engine.structure(fitted) if part == "linear")
+def _share_of(engine, fitted, part):
+    """Share of what a fit leaves that is of one part; 0 where that is noise."""
+    return {name: share for share, name in engine.structure(fitted)}.get(part, 0.0)
 
 
 def _imitators(engine, best, takes, left):
     """Linear causes beside which a filter would take still more: they imitate something else."""
-    share = _linear_share(engine, best)
+    share = _share_of(engine, best, "linear")
     filters = _filters(engine, best)
-    varying = sum(share for share, part in engine.structure(best) if part == "time_varying")
+    varying = _share_of(engine, best, "time_varying")
     if varying > _VARYING and not share:
         # the mean of a delay or gain that moves is a filter, too
         share, more = varying, _MOVING
@@ -193,7 +192,7 @@ def _imitators(engine, best, takes, left):
 
 def resembles(engine, fitted, effect, taken):
     """Why a delay or a shift of the core is not named that a filter would be better than, or ""."""
-    share = _linear_share(engine, fitted)
+    share = _share_of(engine, fitted, "linear")
     if not (effect.pure_delay_s() or effect.restates_core) \
             or taken > _RESEMBLES * math.sqrt(share) * engine.left(fitted).rms:
         return ""
@@ -270,7 +269,7 @@ def _one_filter(engine, best):
 
 def _other_axes(engine, best, takes, left):
     """Causes that bring in the other axes beside which what is left still has much of these."""
-    share = sum(share for share, part in engine.structure(best) if part == "across")
+    share = _share_of(engine, best, "across")
     rest = math.sqrt(share) * left.rms
     return {cause: f"{share:.0%} of what is left comes from the other axes: they come in otherwise"
             for cause, taken in takes.items()
@@ -348,13 +347,13 @@ def _elsewhen(engine, best, takes, left):
                            "is another one"
     courses = [cause for cause in takes if best.effects[cause].shows_with_time
                and not best.effects[cause].everyday]
-    weak = [cause for cause in courses if takes[cause] < WEIGHS * engine.rms(best.residual)]
-    if len(courses) > 1:
-        # a sweep's frequency and level change with time, too: several follow any course
-        for cause in weak:
+    rest = engine.rms(best.residual)
+    # a sweep's frequency and level change with time, too: several follow any course
+    for cause in courses if len(courses) > 1 else ():
+        if takes[cause] < WEIGHS * rest:
             found.setdefault(cause, f"{', '.join(courses)} together follow any course in time, "
-                                    f"and it takes {takes[cause]:.3g} RMS only beside "
-                                    f"{engine.rms(best.residual):.3g} that are left")
+                                    f"and it takes {takes[cause]:.3g} RMS only beside {rest:.3g} "
+                                    "that are left")
     return found
 
 

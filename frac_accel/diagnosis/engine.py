@@ -23,6 +23,7 @@ from .problem import Problem, acts_on_spring
 from .search import Search
 from .stages import COMPARED
 from .stretches import Stretches, stretches_of
+from .words import is_accounted
 
 # Improvement, in variances of one sample's noise and for each parameter, that chance does not give.
 _CHANCE = 30.0
@@ -438,6 +439,11 @@ class Engine:
     def rms(self, values):
         """RMS of values where samples count."""
         return float(np.sqrt(np.mean(values[self.problem.used]**2)))
+
+    def is_accounted(self, fitted, noise):
+        """Whether what a fit leaves is little, or no more than `EstablishedNoise`."""
+        p = self.problem
+        return is_accounted(self.rms(fitted.residual), float(np.std(p.measured[p.used])), noise)
 
     def learnt(self, fitted):
         """The same causes, fitted to the learning part of the record only, beside all that the

@@ -83,9 +83,8 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
     best, gains, left, noise, stds, doubts = settled
     doubted |= more
     findings, tied = [], {}
-    p = engine.problem
-    clear = _CLEAR if is_accounted(engine.rms(best.residual), float(np.std(p.measured[p.used])),
-                                   noise) else max(_CLEAR, _NEARLY * p.count)
+    clear = _CLEAR if engine.is_accounted(best, noise) \
+        else max(_CLEAR, _NEARLY * engine.problem.count)
     suspects = [_suspect({cause}, 0.0, words) for cause, words in doubted.items()]
     most = max((g.taken for g in gains.values()), default=0.0)
     for cause, g in gains.items():
@@ -185,14 +184,13 @@ def _without_the_weakest(engine, here, noise_std, known):
 
 
 def _examined(engine, best, noise_std, known):
-    p = engine.problem
-    if engine.structure(best) or not is_accounted(
-            engine.rms(best.residual), float(np.std(p.measured[p.used])),
-            engine.established_noise(best, noise_std)):
+    if engine.structure(best) or not engine.is_accounted(
+            best, engine.established_noise(best, noise_std)):
         best = engine.plainer(best)
     best, gains = _relevant(engine, _mirrored(engine, best), known)
-    if _mirrored(engine, best) is not best:
-        best, gains = _relevant(engine, _mirrored(engine, best), known)
+    turned = _mirrored(engine, best)
+    if turned is not best:
+        best, gains = _relevant(engine, turned, known)
     best = engine.search.to_its_best(best)
     left = engine.left(best)
     noise = engine.established_noise(best, noise_std)

@@ -139,10 +139,13 @@ class Record:
     def lag_std_s(self):
         """Standard uncertainty [s] that stamps leave to how late one topic is against the other:
         their mean or median where they scatter, and of batches an instant within an interval."""
-        return float(np.hypot(*(
-            1 / (np.sqrt(12) * clock.rate_hz) if clock.kind == "batches"
-            else 1.25 * clock.scatter_s / np.sqrt(clock.independent_stamps(topic.stamps_ns))
-            for topic in self.topics or () for clock in [topic.clock]))) if self.topics else 0.0
+        stds = [0.0]
+        for topic in self.topics or ():
+            clock = topic.clock
+            stds.append(1 / (np.sqrt(12) * clock.rate_hz) if clock.kind == "batches" else
+                        1.25 * clock.scatter_s
+                        / np.sqrt(clock.independent_stamps(topic.stamps_ns)))
+        return float(np.linalg.norm(stds))
 
     @property
     def is_reference_late(self):

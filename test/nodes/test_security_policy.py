@@ -84,7 +84,8 @@ def test_no_node_asks_for_more_than_its_profile_has(tmp_path):
                      "core: {natural_frequency_hz: 90.0, damping_ratio: 0.2}\n")
     bag = ROOT / "bags" / "classical_bench.mcap"
     nodes = {"corrector": {"model_file": model, "metrics_topics": True},
-             "virtual_sensor": {"model_file": model}, "diagnoser": {"model_file": model},
+             "virtual_sensor": {"model_file": model},
+             "diagnoser": {"model_file": model, "results": tmp_path / "results"},
              "recorder": {"bag": tmp_path / "o.mcap", "topics": ["/imu/data"]},
              "player": {"bag": bag, "wait_for_subscribers": 9,
                         "topics": ["/imu/reference", "/imu/data_raw"]}}
