@@ -15,9 +15,9 @@ from .words import AS_NOISE
 
 # Times the odd (even) part of what is left, in RMS, that an odd (even) cause must take.
 _LIKE_LAW = 30.0
-# Logarithm of the size from which a link changes an end of the band, and damping ratio of a pole
-# below which it shows as a resonance.
-_UNDONE = 0.3
+# Logarithm of the size from which a link changes an end of the band, share of the motion's power
+# below its highest frequency, and damping ratio of a pole below which a link shows as a resonance.
+_UNDONE, _MOTION = 0.3, 0.99
 _RESONANT = 0.19
 # Share of the output (RMS) above which what is left says that little of the sensor is understood.
 _MOST_OF = 0.5
@@ -277,9 +277,13 @@ def _other_axes(engine, best, takes, left):
 
 
 def _on_both_sides(engine, best):
-    """Filters of the sensor and of the reference that undo each other at an end of the band."""
+    """Filters of the sensor and of the reference that undo each other at an end of the band, or at
+    that of the motion."""
     p = engine.problem
-    ends = 2j * np.pi * np.array([0.01 / p.time[-1], 10 * p.rate])
+    moving = (best.output - best.output[p.used].mean()) * p.used
+    energy = np.cumsum(np.abs(np.fft.rfft(moving))**2)
+    highest = np.searchsorted(energy, _MOTION * energy[-1]) / p.time[-1]
+    ends = 2j * np.pi * np.array([0.01 / p.time[-1], highest, 10 * p.rate])
     found = {}
     filters = [(cause, effect, np.log(np.abs(effect.transfer_function(ends))))
                for cause, effect in _filters(engine, best).items()

@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..io.samples import Samples
-from ..model import AXES
+from ..model import AXES, AxisModel
+from ..model.core import Gain
 from ..record import Record
 from ..signals.convolution import Convolution
 from ..simulation import simulate, static_gain
@@ -40,14 +41,12 @@ def restored(reference, sensor, model, axis="x", temperature_at=None):
     rate, column = pair.sampling_rate_hz, AXES.index(axis)
     time = np.arange(len(pair)) / rate
     values = np.empty_like(pair.reference)
+    links, on_base = AxisModel(Gain(), model.reference_faults).behind_base
     for i, recorded in enumerate(pair.reference.T):
-        for fault in model.reference_faults:
+        for fault in on_base:
             recorded = fault.change_base(recorded, rate)
         convolution = Convolution(recorded - recorded[0], rate)
-        transfer = np.ones_like(convolution.s)
-        for fault in model.reference_faults:
-            transfer = transfer * fault.transfer_function(convolution.s)
-        values[:, i] = convolution.response(transfer) + recorded[0]
+        values[:, i] = convolution.response(links.transfer_function(convolution.s)) + recorded[0]
     early_s = -sum(fault.pure_delay_s() for fault in model.reference_faults)
     gain = static_gain(model.axis(axis))
     if gain and any(pole == 0 for fault in model.reference_faults for pole in fault.poles()):

@@ -34,7 +34,8 @@ BY_POWER = ("sampling_jitter", "interference_bursts")
 # in test_linear_causes
 LINKS = ("second_resonance", "low_pass_filter", "linear_phase_filter")
 # in test_reference_faults
-OF_REFERENCE = ("reference_ac_coupling", "reference_delay", "reference_low_pass")
+OF_REFERENCE = ("reference_ac_coupling", "reference_delay", "reference_low_pass",
+                "reference_smoothing")
 # in test_reference_noise and test_free_mass
 NOISE_AND_FRICTION = ("reference_noise", "free_mass_friction")
 # in test_empirical_link and test_empirical_map

@@ -12,8 +12,11 @@ from frac_accel.validation import validate
 FAULTS = {
     "reference_ac_coupling": ("corner_hz", lambda s, hz: s / (s + 2 * np.pi * hz), (0.5, 3.0)),
     "reference_low_pass": ("corner_hz", lambda s, hz: 1 / (1 + s / (2 * np.pi * hz)), (60, 400)),
+    "reference_smoothing": ("length_s", lambda s, length: np.sinc(length * s.imag / 2 / np.pi)**3,
+                            (5e-4, 2e-3)),
     "reference_delay": ("delay_s", lambda s, delay: np.exp(-s * delay), (3e-4, 3e-3)),
 }
+FIXED = {"reference_smoothing": {"order": 3}}
 
 
 def model(core, **keys):
@@ -52,7 +55,7 @@ def test_found_and_validated(cause, seed):
 def test_no_part_of_the_correction(cause):
     core, value, _, (_, sensor) = drawn(cause, 0)
     raw = samples(sensor, sensor)[1]
-    fault = {"cause": cause, FAULTS[cause][0]: value}
+    fault = {"cause": cause, FAULTS[cause][0]: value, **FIXED.get(cause, {})}
     one, other = (Corrector(model(core, **keys), sampling_rate_hz=RATE).process(*raw[:3])
                   for keys in ({}, {"reference_faults": [fault]}))
     assert np.array_equal(one.values, other.values, equal_nan=True)

@@ -31,7 +31,7 @@ INSEPARABLE = (
     {"time_delay", "reference_delay"}, {"ac_coupling", "reference_ac_coupling"},
     {"low_pass_lag", "low_pass_filter"}, {"low_pass_filter", "linear_phase_filter"},
     {"low_pass_lag", "linear_phase_filter"}, {"time_delay", "linear_phase_filter"},
-    {"mounting_resonance", "second_resonance"},
+    {"mounting_resonance", "second_resonance"}, {"reference_low_pass", "reference_smoothing"},
     {"cross_axis_sensitivity", "misalignment"}, {"sensitivity_error", "misalignment"},
     {"timestamp_jitter", "sampling_jitter"}, {"offset_drift", "thermal_offset"},
 )

@@ -69,6 +69,10 @@ def second_set(rng, cause, rate_hz, core, output, sign):
     def reference_low_pass():
         return Family(0.5, 20.0, lambda size: {"corner_hz": rate_hz / size}, most=1.0)
 
+    def reference_smoothing():
+        order = int(rng.integers(1, 5))
+        return Family(0.3, 20.0, lambda size: {"length_s": size / rate_hz, "order": order}, 1.0)
+
     families = {
         "linear_phase_filter": linear_phase_filter,
         "low_pass_filter": low_pass_filter,
@@ -91,6 +95,7 @@ def second_set(rng, cause, rate_hz, core, output, sign):
         "interference_bursts": interference_bursts,
         "reference_ac_coupling": lambda: single("corner_hz", 1e-6 * rate_hz, 0.02 * rate_hz),
         "reference_low_pass": reference_low_pass,
+        "reference_smoothing": reference_smoothing,
         "reference_delay": lambda: single("delay_s", 1e-5 / rate_hz, 3 / rate_hz, most=1.4),
         # down to 20 dB below the motion
         "reference_noise": lambda: single("std", 1e-6, 0.1, level / core["sensitivity"]),

@@ -28,6 +28,7 @@ CAUSES = (
 #   backlash      `gap` is the whole width of the play
 #   misalignment  the sensor's axes seen from the reference's: R = Rz(yaw) Ry(pitch) Rx(roll) turns
 #                 a vector in the sensor's axes into the reference's
+#   reference_smoothing  `order` moving averages, each centred on its instant
 #   interference_bursts  `rms` is that within a burst
 SECOND_SET = (
     "misalignment",
@@ -35,12 +36,13 @@ SECOND_SET = (
     "low_pass_filter", "linear_phase_filter",
     "time_step", "sampling_jitter",
     "gain_step", "thermal_offset", "offset_drift", "offset_step", "interference_bursts",
-    "reference_ac_coupling", "reference_low_pass", "reference_delay", "reference_noise",
+    "reference_ac_coupling", "reference_low_pass", "reference_smoothing", "reference_delay",
+    "reference_noise",
 )
 
 # They change what was recorded of the motion, and not what the sensor feels.
-ON_REFERENCE = ("reference_ac_coupling", "reference_low_pass", "reference_delay",
-                "reference_noise")
+ON_REFERENCE = ("reference_ac_coupling", "reference_low_pass", "reference_smoothing",
+                "reference_delay", "reference_noise")
 
 # Physics that no cause of the package describes: a diagnosis may not give it one of the names
 # above. A sensor model cannot say it either, so `to_model` leaves it out. What each one is and its

@@ -233,20 +233,23 @@ def test_backlash_of_a_sine_in_its_closed_form():
 
 
 TWINS = {  # what the reference's fault is as a fault of a flat sensor
-    "reference_ac_coupling": ("ac_coupling", {"corner_hz": 3.0}),
-    "reference_low_pass": ("low_pass_lag", {"corner_hz": 120.0}),
-    "reference_delay": ("time_delay", {"delay_s": 1.37e-3}),
+    "reference_ac_coupling": ({"corner_hz": 3.0}, {"ac_coupling": {"corner_hz": 3.0}}),
+    "reference_low_pass": ({"corner_hz": 120.0}, {"low_pass_lag": {"corner_hz": 120.0}}),
+    "reference_smoothing": ({"length_s": 1.9e-3, "order": 3},
+                            {"linear_phase_filter": {"length_s": 1.9e-3, "order": 3},
+                             "time_delay": {"delay_s": -1.5 * 1.9e-3}}),
+    "reference_delay": ({"delay_s": 1.37e-3}, {"time_delay": {"delay_s": 1.37e-3}}),
 }
 
 
 @pytest.mark.parametrize("fault", TWINS)
 def test_a_fault_of_the_reference_changes_the_reference_alone(fault):
-    twin, parameters = TWINS[fault]
+    parameters, twins = TWINS[fault]
     excitation = noise()
     record = rig.simulate_record(flat({fault: parameters}), excitation)
     bare = rig.simulate_record(flat(), excitation)
     assert np.array_equal(record.sensor, bare.sensor)
-    exact = rig.exact_output(flat({twin: parameters}), "x", excitation)
+    exact = rig.exact_output(flat(twins), "x", excitation)
     assert relative_rms(record.reference[:, 0] - exact, exact) < MEASURED
     model = flat({fault: parameters}).to_model()
     assert model["effects"] == []  # it is no part of the sensor
