@@ -14,8 +14,10 @@ oldest := .venv-oldest
 docs := .venv-docs
 python := $(venv)/bin/python
 numerical := -m pytest -n 2
-# What no numerical library's age can change: packages, pages in a browser, nodes.
-not_numerical := $(addprefix --ignore=test/,package report nodes)
+# What no numerical library's age can change: packages, pages in a browser, nodes, and what full
+# disks, signals and damaged files do to the commands.
+not_numerical := $(addprefix --ignore=test/,package report nodes fleet/test_local_cores.py \
+    $(addprefix commands/test_,outputs.py write_errors.py fuzz.py command_fleet.py command_line.py))
 # What an installer says is kept, and shown only where it fails.
 quietly = > $(venv)/install.log 2>&1 || { cat $(venv)/install.log; exit 1; }
 
@@ -44,9 +46,9 @@ check test test-all test-others test-oldest: export OPENBLAS_NUM_THREADS := 1
 check: $(venv)/.frac_accel lint types
 	$(python) -m pytest -q -n 2 -m fast
 
+# One worker more than there are cores for those that need ROS, which mostly wait.
 test: setup lint types
-	$(python) $(numerical) -m "not ros and not long"
-	$(python) -m pytest -m ros
+	$(python) -m pytest -n 3 --dist loadgroup -m "not long"
 
 # The further draws and the long Monte Carlos (hours), the site, and the rest with the oldest
 # libraries.
