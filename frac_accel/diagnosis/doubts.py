@@ -24,6 +24,8 @@ _MOST_OF = 0.5
 # A filter beside which a linear part is left must take this many times its RMS, or it may only
 # resemble the true one; several ones may in any case. Likewise what changes with time.
 _RESEMBLES = 30.0
+# The same of what brings in the other axes: these have causes of their own, too.
+_ACROSS = 10.0
 # Correlation from which a shift of the core does what a law of force does, and times what is left,
 # in RMS, that the law must then take to be told from others.
 _ALIKE, _TELLS_LAW = 0.8, 5.0
@@ -102,6 +104,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
             doubts.setdefault(cause, f"it nearly cancels {other}: together they may stand for "
                                      "one cause that is not known")
     for cause, words in {**_parts_of_a_law(best, takes, added, left),
+                         **_hardly_more(engine, best, left),
                          **_corrections(engine, best, takes)}.items():
         doubts.setdefault(cause, words)
     if gains and (left.share > 0 or not engine.is_accounted(best, noise)):
@@ -190,6 +193,25 @@ def _imitators(engine, best, takes, left):
     return dict.fromkeys(linear, more.format(share))
 
 
+def _hardly_more(engine, best, left):
+    """Filters that take little more than what is common in their place does, beside what a filter
+    would still take: that may be the response's other part."""
+    share, low = next(((entry["share"], entry["ci95"][0]) for entry in engine.budget(best).parts
+                       if entry["part"] == "linear"), (0.0, 0.0))
+    found = {}
+    for cause, effect in _filters(engine, best).items() if low > 0 else ():
+        if effect.everyday or not is_link(effect):
+            continue
+        plain = engine.as_plain(best, cause)
+        more = math.sqrt(max(plain.cost - best.cost, 0.0) / engine.problem.count) \
+            if plain else math.inf
+        if more < WEIGHS * math.sqrt(share) * left.rms:
+            common = ", ".join(sorted(plain.causes - best.causes)) or "nothing"
+            found[cause] = (f"{common} in its place takes only {more:.3g} RMS less, and a linear "
+                            f"filter would take another {share:.0%} of what is left")
+    return found
+
+
 def resembles(engine, fitted, effect, taken):
     """Why a delay or a shift of the core is not named that a filter would be better than, or ""."""
     share = _share_of(engine, fitted, "linear")
@@ -273,7 +295,7 @@ def _other_axes(engine, best, takes, left):
     rest = math.sqrt(share) * left.rms
     return {cause: f"{share:.0%} of what is left comes from the other axes: they come in otherwise"
             for cause, taken in takes.items()
-            if best.effects[cause].stage == CROSS_AXIS and taken < _RESEMBLES * rest}
+            if best.effects[cause].stage == CROSS_AXIS and taken < _ACROSS * rest}
 
 
 def _on_both_sides(engine, best):

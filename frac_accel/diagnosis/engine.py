@@ -422,13 +422,17 @@ class Engine:
         for cause, effect in best.effects.items():
             if effect.everyday or not is_link(effect) or cause in self.search.base:
                 continue
-            for fit in [*self.search.fits.values()]:
-                more = fit.causes - best.causes
-                if fit.cost < (1 + _PLAINLY) * best.cost and fit.size <= best.size \
-                        and best.causes - fit.causes == {cause} \
-                        and all(fit.effects[name].everyday for name in more):
-                    return fit
+            plain = self.as_plain(best, cause)
+            if plain and plain.cost < (1 + _PLAINLY) * best.cost:
+                return plain
         return best
+
+    def as_plain(self, best, cause):
+        """The best fit, no larger, with what is common in the place of a cause; or None."""
+        return min((fit for fit in self.search.fits.values()
+                    if fit.size <= best.size and best.causes - fit.causes == {cause}
+                    and all(fit.effects[name].everyday for name in fit.causes - best.causes)),
+                   key=lambda fit: fit.cost, default=None)
 
     def stands_alone(self, fitted, cause, taken):
         """Whether what a cause takes (RMS) stands far out of what is left where it acts, whatever

@@ -136,19 +136,22 @@ def _settled(engine, best, noise_std, known=None):
     known = known or {}
     here, dropped = _without_the_weakest(engine, _examined(engine, best, noise_std, known),
                                          noise_std, known)
+    there, gone = here, {}
     for _ in range(_AGAIN):
         # what cannot be named must not stand in the way of what can
-        unwanted = {cause for cause in here.doubts if cause not in engine.uncontested}
+        unwanted = {cause for cause in there.doubts if cause not in engine.uncontested}
         # what is common may be in doubt only for its odd company
         unwanted = {cause for cause in unwanted
-                    if not here.best.effects[cause].everyday} or unwanted
+                    if not there.best.effects[cause].everyday} or unwanted
         if not unwanted:
             break
-        there = _examined(engine, engine.instead(here.best, unwanted), noise_std, known)
-        if there.doubts or not there.gains.keys() - here.gains.keys():
+        gone |= {cause: there.doubts[cause] for cause in unwanted}
+        there = _examined(engine, engine.instead(there.best, unwanted), noise_std, known)
+        # one that is doubtful, too, may lead to another that is not
+        if not there.doubts:
+            if there.gains.keys() - here.gains.keys():
+                here, dropped = there, {**dropped, **gone}
             break
-        dropped.update({cause: here.doubts[cause] for cause in unwanted})
-        here = there
     if here.doubts:
         standing = here.gains.keys() - here.doubts.keys()
         gone = {**here.doubts, **_refitted(engine, here.best, standing, {})[2]}

@@ -4,9 +4,10 @@ import numpy as np
 
 _AXES = "xyz"
 # Standard deviations by which a turn must stand out, and what the shares may differ from those of a
-# turn, over what the turn adds.
+# turn: over what the turn adds, and besides in standard deviations. A share in one axis only
+# differs by as much as it would add.
 _SURE = 6.0
-_LIKE = 0.2
+_LIKE, _WITHIN = 0.2, 3.0
 # With one axis measured: own share, over that of all, above which nothing tells a turn.
 _FAR = 0.85
 
@@ -37,7 +38,7 @@ def turn_of(view):
         error = np.linalg.norm((block / scale - nearest)[apart])
         noise = np.linalg.norm(stds[np.ix_(moving, moving)][apart]) / scale
         size = np.linalg.norm((nearest - np.eye(len(moving)))[apart])
-        if size < _SURE * noise or error > _LIKE * size + _SURE * noise:
+        if size < _SURE * noise or error > _LIKE * size + _WITHIN * noise:
             return None
         turned[np.ix_(moving, moving)] = nearest
     else:
