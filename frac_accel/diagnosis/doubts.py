@@ -21,9 +21,10 @@ _UNDONE, _MOTION = 0.3, 0.99
 _RESONANT = 0.19
 # Share of the output (RMS) above which what is left says that little of the sensor is understood.
 _MOST_OF = 0.5
-# A filter beside which a linear part is left must take this many times its RMS, or it may only
-# resemble the true one; several ones may in any case. Likewise what changes with time.
-_RESEMBLES = 30.0
+# Times the RMS of the linear part that is left which what is linear must take, or it may only
+# resemble the true response; and what a filter must, for one imitates another to a per cent.
+# Several filters may in any case. Likewise what changes with time.
+_RESEMBLES, _IMITATES = 30.0, 100.0
 # The same of what brings in the other axes: these have causes of their own, too.
 _ACROSS = 10.0
 # Correlation from which a shift of the core does what a law of force does, and times what is left,
@@ -186,7 +187,8 @@ def _imitators(engine, best, takes, left):
                 if best.effects[cause].is_constant and taken < _RESEMBLES * rest}
     # a delay is common beside any filter
     odd = [cause for cause, effect in filters.items() if not effect.everyday] or list(filters)
-    if len(odd) == 1 and takes.get(odd[0], np.inf) > _RESEMBLES * rest:
+    if len(odd) == 1 and takes.get(odd[0], np.inf) > rest * (
+            _RESEMBLES if filters[odd[0]].everyday else _IMITATES):
         return {}
     linear = [cause for cause, effect in best.effects.items()
               if cause in takes and (cause in filters or effect.is_constant)]

@@ -44,6 +44,9 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
         record, used = strongest_part(record, column, used, LONG // 2)
     own = Engine(record, column, model, used, opened(model), limit=limit)
     before = own.search.fit({**own.search.base, **seed})
+    before = _with_what_stands_alone(own, before)
+    seed = {cause: effect for cause, effect in before.effects.items()
+            if cause in seed or cause not in own.search.base}
     flat = SensorModel(Gain(model.axes[column].core.sensitivity))
     links = [cause for cause, effect in known_effects().items()
              if effect.acts_on(flat.core) and not effect.read_off and not effect.of_reference
@@ -63,3 +66,16 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
         return None
     return flat, {cause: effect for cause, effect in found.effects.items()
                   if cause not in engine.search.base}
+
+
+def _with_what_stands_alone(engine, fitted):
+    """A fit with what stands far out in one place, such as a tone, beside any response: it would
+    hide how much better one is than the other."""
+    for cause, effect in known_effects().items():
+        if effect.beside is Effect.beside or effect.read_off or cause in fitted.effects:
+            continue
+        for start in effect.starts(engine.search.view(fitted)):
+            fit = engine.search.fit({**fitted.effects, cause: start.effect})
+            if engine.stands_alone(fit, cause, engine.rms(engine.added(fit, cause))):
+                fitted = fit
+    return fitted
