@@ -14,11 +14,9 @@ from ..model.core.oscillator import tail_rates
 from ..model.effects.base import CORE, CROSS_AXIS, GAIN, Effect
 from ..model.parameters import Scales, fixed_values, parameter_fields
 from ..signals.kept import kept
-from ..simulation import AxisSimulator
+from ..simulation import EDGE, AxisSimulator
 from .time_limit import TimeLimit
 
-# Samples at both ends that the band-limited simulation cannot know.
-_EDGE = 64
 # Iterations of a fit, and steps that are tried in each.
 _ITERATIONS = 12
 _TRIES = 6
@@ -178,7 +176,7 @@ class Problem:
         self.time = np.arange(len(record)) / self.rate  # since this part's start
         self.measured = record.sensor[:, axis]
         self.used = used.copy()
-        self.edge = min(_EDGE, len(record) // 16)
+        self.edge = min(EDGE, len(record) // 16)
         self.used[:self.edge] = self.used[len(record) - self.edge:] = False
         self._simulators = {}
         self._last, self._moved, self._others = (None, None), (None, None), {}
@@ -310,7 +308,7 @@ class Problem:
     def own_motions(self, effect):
         """Orthonormal columns, shape (n, m): slow motions that a cause of its own may have left."""
         slow = [pole for pole in np.atleast_1d(effect.poles())
-                if -pole.real * _EDGE < self.rate]
+                if -pole.real * EDGE < self.rate]
         columns = self._decays([pole for pole in slow if pole != 0])
         if any(pole == 0 for pole in slow):
             columns = np.c_[columns, np.ones(len(columns)), self.time]

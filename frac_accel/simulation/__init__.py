@@ -15,6 +15,9 @@ from ..signals.convolution import Convolution, at_positions
 from ..signals.kept import kept
 from .modes import modes_of
 
+# Samples at both ends that the band-limited simulation of a record cannot know: what the base did
+# before and does after, within the reach of its interpolation.
+EDGE = 64
 # Factor by which the response of a linear sensor is refined before it is read between samples.
 _REFINED = 4
 # A nonlinear core is stepped this often in each sampling interval, and three times as often in each

@@ -16,7 +16,7 @@ from ..record.sources import pair_of
 from ..shown import Shown, above
 from ..signals.metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
 from ..signals.thinning import envelope
-from ..simulation import simulate
+from ..simulation import EDGE, simulate
 from ..streaming import Corrector
 from ..streaming.batches import restamped
 from .reference import restored
@@ -67,7 +67,7 @@ class Validation(Shown):
         What was done to put reference and sensor together: rates, band, offset of the clocks.
     whole_nrmse : float
         RMS of simulated less measured output over the measured one's standard deviation, at all
-        frequencies.
+        frequencies, without `simulation.EDGE` samples at both ends.
     """
 
     simulation: ErrorMetrics
@@ -247,13 +247,15 @@ def _simulated(model, pair, column, temperature_at):
         temperature = temperature_at(pair.start_ns + 1e9 * seconds)
     at = np.arange(len(pair)) / pair.sampling_rate_hz
     instants = np.round(1e9 * at).astype(np.int64)
+    inside, edge = pair.valid.copy(), min(EDGE, len(pair) // 16)
+    inside[:edge] = inside[len(pair) - edge:] = False
 
     def begun(initial):
         simulated = simulate(model, pair.reference, pair.sampling_rate_hz, initial=initial,
                              temperature_c=temperature)
         shifted = interpolate(instants, simulated, instants + round(1e9 * pair.lag_s),
                               pair.sampling_rate_hz)[:, column]
-        run = _longest_run(np.isfinite(shifted) & pair.valid, instants, pair.sampling_rate_hz)
+        run = _longest_run(np.isfinite(shifted) & inside, instants, pair.sampling_rate_hz)
         return pair.sensor[run, column], shifted[run]
     # how it moved before the record is not known: a free mass does not move on by itself
     return min((begun(initial) for initial in ("steady", "rest")),
