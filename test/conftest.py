@@ -53,6 +53,7 @@ def pytest_ignore_collect(collection_path, config):
     return None
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist looks which are one group
 def pytest_collection_modifyitems(config, items):
     """Mark them, but nothing that is long or needs ROS or the real records.
 
