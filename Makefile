@@ -7,7 +7,7 @@ unexport PYTHONPATH LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DELETE_ON_ERROR:
-.PHONY: setup demo docs check test test-all test-others test-oldest lint types bench bench-fleet soak blind fuzz browser pins clean FORCE
+.PHONY: setup demo docs check test test-numerical test-ros test-all test-others test-oldest lint types bench bench-fleet soak blind fuzz browser pins clean FORCE
 
 venv := .venv
 oldest := .venv-oldest
@@ -40,15 +40,23 @@ docs: setup $(docs)/.done
 	@echo site/index.html
 
 # BLAS threads would only fight with the other worker.
-check test test-all test-others test-oldest: export OPENBLAS_NUM_THREADS := 1
+check test test-numerical test-ros test-all test-others test-oldest: export OPENBLAS_NUM_THREADS := 1
 
 # In a minute what catches most.
 check: $(venv)/.frac_accel lint types
 	$(python) -m pytest -q -n 2 -m fast
 
-# One worker more than there are cores for those that need ROS, which mostly wait.
+# Those that need ROS run beside the others: they wait more than they work, and come before them.
 test: setup lint types
-	$(python) -m pytest -n 3 --dist loadgroup -m "not long"
+	@$(MAKE) --no-print-directory -j 2 -k test-numerical test-ros
+
+test-numerical:
+	env -u MAKEFLAGS nice -n 10 $(python) $(numerical) -m "not ros and not long"
+
+# Told when they are done.
+test-ros:
+	@env -u MAKEFLAGS $(python) -m pytest -m ros > $(venv)/ros.log 2>&1; failed=$$?; \
+	    cat $(venv)/ros.log; exit $$failed
 
 # The further draws and the long Monte Carlos (hours), the site, and the rest with the oldest
 # libraries.

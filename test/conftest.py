@@ -1,12 +1,7 @@
-"""Which tests `make check` and `colcon test` run, which of many draws `make test` spares.
-
-And how its tests share the cores."""
-
-import os
+"""Which tests `make check` and `colcon test` run, and which of many draws `make test` spares."""
 
 import pytest
 
-_NICE = 10
 # Files whose tests catch most for their time, and what takes long in them.
 FAST = """
     bag_hostile bag_roundtrip cdr commands core_response diagnosis_thresholds effect_checks
@@ -53,18 +48,8 @@ def pytest_ignore_collect(collection_path, config):
     return None
 
 
-@pytest.hookimpl(tryfirst=True)  # before xdist looks which are one group
-def pytest_collection_modifyitems(config, items):
-    """Mark them, but nothing that is long or needs ROS or the real records.
-
-    Of several workers one runs the tests that need ROS, one after the other and from the start:
-    they wait more than they work, and their nodes would hear each other.
-    """
-    if config.pluginmanager.hasplugin("xdist"):
-        items.sort(key=needs_no_ros)
-        for item in items:
-            if not needs_no_ros(item):
-                item.add_marker(pytest.mark.xdist_group("ros"))
+def pytest_collection_modifyitems(items):
+    """Mark them, but nothing that is long or needs ROS or the real records."""
     seen = set()
     for item in items:
         if item.path.stem.removeprefix("test_") in MANY_DRAWS:
@@ -75,14 +60,3 @@ def pytest_collection_modifyitems(config, items):
         if item.path.stem.removeprefix("test_") in FAST and item.originalname not in SLOW \
                 and not any(map(item.get_closest_marker, ("long", "ros", "real_data"))):
             item.add_marker(pytest.mark.fast)
-
-
-def needs_no_ros(item):
-    """Whether a test needs neither DDS nor an installed package."""
-    return item.get_closest_marker("ros") is None
-
-
-def pytest_runtest_setup(item):
-    """Beside a worker whose nodes live in real time, the others are nice."""
-    if "PYTEST_XDIST_WORKER" in os.environ and needs_no_ros(item) and os.nice(0) == 0:
-        os.nice(_NICE)
