@@ -110,6 +110,8 @@ def compute_once(monkeypatch):
     for where, name in (("identification", "identify"), ("diagnosis", "diagnose"),
                         ("paper", "reproduce"), ("validation", "validate"),
                         ("simulation", "simulate"), ("budget", "left_by"), ("bench.kernel", "run"),
+                        # first: it has the name from the module after it
+                        ("commands._correct_page", "correction_page"),
                         ("report.correction", "correction_page"),
                         ("report.identification", "identification_page"),
                         ("report.diagnosis", "diagnosis_page"), ("report.paper", "paper_page")):
