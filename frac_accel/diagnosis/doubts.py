@@ -22,9 +22,11 @@ _RESONANT = 0.19
 # Share of the output (RMS) above which what is left says that little of the sensor is understood.
 _MOST_OF = 0.5
 # Times the RMS of the linear part that is left which what is linear must take, or it may only
-# resemble the true response; and what a filter must, for one imitates another to a per cent.
-# Several filters may in any case. Likewise what changes with time.
-_RESEMBLES, _IMITATES = 30.0, 100.0
+# resemble the true response; and what a filter must where that part is most
+# of what is left, for one imitates another to a per cent. Several filters may in any case. Likewise what changes with time.
+_RESEMBLES, _IMITATES, _MOSTLY = 30.0, 100.0, 0.5
+# Share of what is left that its linear part surely must have to count.
+_SURELY = 0.03
 # The same of what brings in the other axes: these have causes of their own, too.
 _ACROSS = 10.0
 # Correlation from which a shift of the core does what a law of force does, and times what is left,
@@ -168,10 +170,16 @@ def _share_of(engine, fitted, part):
     return {name: share for share, name in engine.structure(fitted)}.get(part, 0.0)
 
 
+def _linear_share(engine, fitted):
+    """Share of what a fit leaves that a linear filter surely would take, be it little."""
+    part = next((entry for entry in engine.budget(fitted).parts if entry["part"] == "linear"), None)
+    return part["share"] if part and part["ci95"][0] > _SURELY \
+        else _share_of(engine, fitted, "linear")
+
+
 def _imitators(engine, best, takes, left):
     """Linear causes beside which a filter would take still more: they imitate something else."""
-    share = _share_of(engine, best, "linear")
-    filters = _filters(engine, best)
+    share, filters = _linear_share(engine, best), _filters(engine, best)
     varying = _share_of(engine, best, "time_varying")
     if varying > _VARYING and not share:
         # the mean of a delay or gain that moves is a filter, too
@@ -188,7 +196,7 @@ def _imitators(engine, best, takes, left):
     # a delay is common beside any filter
     odd = [cause for cause, effect in filters.items() if not effect.everyday] or list(filters)
     if len(odd) == 1 and takes.get(odd[0], np.inf) > rest * (
-            _RESEMBLES if filters[odd[0]].everyday else _IMITATES):
+            _RESEMBLES if filters[odd[0]].everyday or share < _MOSTLY else _IMITATES):
         return {}
     linear = [cause for cause, effect in best.effects.items()
               if cause in takes and (cause in filters or effect.is_constant)]
@@ -198,10 +206,8 @@ def _imitators(engine, best, takes, left):
 def _hardly_more(engine, best, left):
     """Filters that take little more than what is common in their place does, beside what a filter
     would still take: that may be the response's other part."""
-    share, low = next(((entry["share"], entry["ci95"][0]) for entry in engine.budget(best).parts
-                       if entry["part"] == "linear"), (0.0, 0.0))
-    found = {}
-    for cause, effect in _filters(engine, best).items() if low > 0 else ():
+    share, found = _linear_share(engine, best), {}
+    for cause, effect in _filters(engine, best).items() if share else ():
         if effect.everyday or not is_link(effect):
             continue
         plain = engine.as_plain(best, cause)
@@ -409,6 +415,11 @@ def _acausal(engine, best, stds):
     # the reference's delay is a lead of the sensor
     late = {cause: -effect.pure_delay_s() for cause, effect in links.items()
             if effect.of_reference and effect.pure_delay_s() < 0}
+    strange = [cause for cause in own if not best.effects[cause].everyday]
+    if late and strange and not p.record.is_reference_late:
+        lead = max(late.values())
+        return dict.fromkeys([*late, *strange], f"a lead of {lead:.3g} s, which only a fit beside "
+                             "a filter shows: together they imitate something else")
     return {cause: f"a lead of {lead:.3g} s beside a filter, less than a sampling interval: a "
                    "digital filter has one of its own"
             for cause, lead in late.items() if own and lead < 1 / p.rate} | {

@@ -6,9 +6,10 @@ from ..model.effects import Effect, known_effects
 from .engine import LONG, Engine
 from .stretches import strongest_part
 
-# Links that are fitted, and the share of an oscillator's residual power that one may leave.
+# Links that are fitted, and the share of an oscillator's residual power that one may leave: by
+# itself, and where it is as good as the oscillator with one.
 _FITTED = 6
-_FAR_LESS = 0.1
+_FAR_LESS, _LESS = 0.1, 0.5
 # Damping ratio from which an oscillator is two lags.
 _OVERDAMPED = 1.0
 # Variances of the noise within which a gain with one link describes a record as well.
@@ -42,30 +43,42 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
     """
     if len(record) > LONG:
         record, used = strongest_part(record, column, used, LONG // 2)
-    own = Engine(record, column, model, used, opened(model), limit=limit)
+    links = [cause for cause, effect in known_effects().items()
+             if not effect.read_off and not effect.of_reference
+             and effect.transfer_function is not Effect.transfer_function]
+    own = Engine(record, column, model, used, opened(model), links, limit=limit)
     before = own.search.fit({**own.search.base, **seed})
     before = _with_what_stands_alone(own, before)
     seed = {cause: effect for cause, effect in before.effects.items()
             if cause in seed or cause not in own.search.base}
     flat = SensorModel(Gain(model.axes[column].core.sensitivity))
-    links = [cause for cause, effect in known_effects().items()
-             if effect.acts_on(flat.core) and not effect.read_off and not effect.of_reference
-             and effect.transfer_function is not Effect.transfer_function]
-    engine = Engine(record, column, flat, used, opened(flat), links, limit=limit)
-    start = engine.search.fit({**engine.search.base, **seed})
-    fits = engine.search.fit_all([
-        engine.search.begun(start, cause, begin)
-        for _, cause, begin in engine.search.screen(start)[:_FITTED]], start.cost)
+    engine = Engine(record, column, flat, used, opened(flat),
+                    [cause for cause in links if known_effects()[cause].acts_on(flat.core)],
+                    limit=limit)
+    fits = _with_a_link(engine, engine.search.fit({**engine.search.base, **seed}))
     # as well with fewer parameters is better
     as_well = (1 + _AS_WELL / own.problem.count) * before.cost
     # without a resonance two lags are no oscillator: what else says as much is as likely
     enough = _FAR_LESS if model.axes[column].core.damping_ratio < _OVERDAMPED else 1.0
     found = next((fit for fit in fits if fit.cost <= enough * before.cost
                   or (fit.size < before.size and fit.cost <= as_well)), None)
+    if found is None and fits and fits[0].cost < _LESS * before.cost:
+        # a filter may be better than an oscillator, and as good as one with another link
+        found = next((fit for rival in _with_a_link(own, before)[:1] for fit in fits
+                      if fit.size < rival.size
+                      and fit.cost <= (1 + _AS_WELL / own.problem.count) * rival.cost), None)
     if found is None:
         return None
     return flat, {cause: effect for cause, effect in found.effects.items()
                   if cause not in engine.search.base}
+
+
+def _with_a_link(engine, fitted):
+    """Fits with one link more, the best first."""
+    search = engine.search
+    return sorted(search.fit_all([search.begun(fitted, cause, begin) for _, cause, begin in
+                                  search.screen(fitted)[:_FITTED]], fitted.cost),
+                  key=lambda fit: fit.cost)
 
 
 def _with_what_stands_alone(engine, fitted):

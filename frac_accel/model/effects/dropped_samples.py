@@ -7,6 +7,10 @@ import numpy as np
 from ..parameters import parameter
 from .base import STAMPS, Effect, Reading
 
+# Samples of which fewer may seem to be missing where stamps scatter by more than such a share of
+# the sampling interval (RMS).
+_SEVERAL, _SCATTER = 9, 0.1
+
 
 @dataclasses.dataclass(frozen=True)
 class DroppedSamples(Effect):
@@ -23,7 +27,11 @@ class DroppedSamples(Effect):
         return cls(found.dropped_fraction) if found.missing else None
 
     def reading(self, seen):
-        """Beside a simulation whose samples are counted as if none were lost."""
+        """Beside a simulation whose samples are counted as if none were lost; None of so few among
+        instants that scatter that chance may do it."""
+        if seen.found.missing < _SEVERAL \
+                and seen.found.jitter_rms_s * seen.record.sampling_rate_hz > _SCATTER:
+            return None
         counted = np.flatnonzero(seen.record.valid)
         late = seen.used[counted]
         share, whole = self.fraction, seen.found.samples + seen.found.missing
