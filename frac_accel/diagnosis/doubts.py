@@ -22,8 +22,9 @@ _RESONANT = 0.19
 # Share of the output (RMS) above which what is left says that little of the sensor is understood.
 _MOST_OF = 0.5
 # Times the RMS of the linear part that is left which what is linear must take, or it may only
-# resemble the true response; and what a filter must where that part is most
-# of what is left, for one imitates another to a per cent. Several filters may in any case. Likewise what changes with time.
+# resemble the true response; and what a filter must where that part is most of what is left, for
+# one imitates another to a per cent. Several filters may in any case. Likewise what changes with
+# time.
 _RESEMBLES, _IMITATES, _MOSTLY = 30.0, 100.0, 0.5
 # Share of what is left that its linear part surely must have to count.
 _SURELY = 0.03

@@ -198,7 +198,8 @@ class Engine:
                 self.search.fit_all([self.search.begun(less, rival, begin) for _, rival, begin in
                                      self.search.screen(less)[:_RIVALS] if rival != cause]
                                     + [best.effects])
-            variance = best.cost / self.problem.count
+            variance = best.cost / self.problem.count \
+                * noise_peak(best.residual, self.problem.used)
             near = sorted((fit for fit in self.search.fits.values()
                            if len(fit.effects) <= len(best.effects)
                            and not fit.causes & unwanted),
