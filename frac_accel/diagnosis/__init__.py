@@ -134,15 +134,14 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         candidates=[cause for cause, effect in known_effects().items()
                     if not effect.read_off and effect.acts_on(model.axis(axis).core)],
         stages=stages, step=found.step, limit=limit,
-        passed_on=None if noise and noise.bends else noise, loose=loose)
+        passed_on=None if noise and noise.bends else noise, loose=loose,
+        in_own_core=[cause for cause, entry in loose.items()
+                     if seed is not None and entry.effect.restates_core])
     engine, stray = _without_spikes(engine, used, stray, record.reference[:, column])
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
     engine.spikes, engine.aside = stray, stray | (record.valid & ~moving)
-    if seed is not None:
-        engine.in_own_core = [cause for cause, entry in loose.items()
-                              if entry.effect.restates_core]
     engine.identified = {cause: effect for cause, effect in (seed or {}).items() if effect.everyday}
     _require_relation(engine, axis, seed)
     best = engine.run(seed)

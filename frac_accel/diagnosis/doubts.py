@@ -108,7 +108,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
             doubts.setdefault(cause, f"it nearly cancels {other}: together they may stand for "
                                      "one cause that is not known")
     for cause, words in {**_parts_of_a_law(best, takes, added, left),
-                         **_hardly_more(engine, best, left),
+                         **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
                          **_corrections(engine, best, takes)}.items():
         doubts.setdefault(cause, words)
     if gains and (left.share > 0 or not engine.is_accounted(best, noise)):
@@ -172,9 +172,10 @@ def _share_of(engine, fitted, part):
 
 
 def _linear_share(engine, fitted):
-    """Share of what a fit leaves that a linear filter surely would take, be it little."""
+    """Share of what a fit leaves that a linear filter would take: be it little, where more shows
+    that this is no noise; 0 where it is."""
     part = next((entry for entry in engine.budget(fitted).parts if entry["part"] == "linear"), None)
-    return part["share"] if part and part["ci95"][0] > _SURELY \
+    return part["share"] if part and engine.structure(fitted) and part["ci95"][0] > _SURELY \
         else _share_of(engine, fitted, "linear")
 
 
@@ -267,16 +268,21 @@ def _parts_of_a_law(best, takes, added, left):
 
 
 def _corrections(engine, best, takes):
-    """Delays and shifts of the core that take less than what is left, and little beside a filter:
-    they may only mend what that lacks."""
-    filters = _filters(engine, best)
-    large = {cause: takes[cause] for cause in filters if cause in takes}
-    cause = max(large, key=large.get, default=None)
-    most = min(_MENDS * large.get(cause, 0.0), engine.rms(best.residual))
-    return {small: f"it takes {takes[small]:.3g} RMS only beside {cause} ({takes[cause]:.3g} RMS): "
-                   "it may mend what that lacks"
-            for small in large if takes[small] < most
-            and (filters[small].pure_delay_s() or filters[small].restates_core)}
+    """Causes that take less than what is left, and little beside a larger one: they may only mend
+    what that lacks. Delays and shifts of the core do so beside a filter, odd ones beside any."""
+    filters, found = _filters(engine, best), {}
+    rest = engine.rms(best.residual)
+    for among, small in (
+            ({cause for cause in filters if cause in takes},
+             lambda cause: filters[cause].pure_delay_s() or filters[cause].restates_core),
+            (takes, lambda cause: not best.effects[cause].everyday
+             and not engine.stands_alone(best, cause, takes[cause]))):
+        large = max(among, key=takes.get, default=None)
+        found |= {cause: f"it takes {takes[cause]:.3g} RMS only beside {large} "
+                         f"({takes[large]:.3g} RMS): it may mend what that lacks"
+                  for cause in among if takes[cause] < min(_MENDS * takes[large], rest)
+                  and small(cause)}
+    return found
 
 
 def _one_filter(engine, best):
@@ -307,14 +313,32 @@ def _other_axes(engine, best, takes, left):
             if best.effects[cause].stage == CROSS_AXIS and taken < _ACROSS * rest}
 
 
+def _highest_hz(engine, best):
+    """Frequency [Hz] below which nearly all of the motion is that the sensor shows."""
+    used = engine.problem.used
+    energy = np.cumsum(np.abs(np.fft.rfft((best.output - best.output[used].mean()) * used))**2)
+    return np.searchsorted(energy, _MOTION * energy[-1]) * engine.problem.rate / len(used)
+
+
+def _beyond_the_motion(engine, best):
+    """Links that make fast motion larger and resonate above all of it, beside a late reference."""
+    if not engine.problem.record.is_reference_late:
+        return {}
+    highest = _highest_hz(engine, best)
+    top = np.array([2j * np.pi * highest])
+    return {cause: f"it resonates above the motion, which ends at {highest:.3g} Hz: to a reference "
+                   "that is late and was smoothed, fast motion looks as much too large"
+            for cause, effect in _filters(engine, best).items()
+            if is_link(effect) and not effect.of_reference and len(effect.poles())
+            and abs(effect.transfer_function(top)[0]) > 1
+            and np.abs(effect.poles()).min() > abs(top[0])}
+
+
 def _on_both_sides(engine, best):
     """Filters of the sensor and of the reference that undo each other at an end of the band, or at
     that of the motion."""
     p = engine.problem
-    moving = (best.output - best.output[p.used].mean()) * p.used
-    energy = np.cumsum(np.abs(np.fft.rfft(moving))**2)
-    highest = np.searchsorted(energy, _MOTION * energy[-1]) / p.time[-1]
-    ends = 2j * np.pi * np.array([0.01 / p.time[-1], highest, 10 * p.rate])
+    ends = 2j * np.pi * np.array([0.01 / p.time[-1], _highest_hz(engine, best), 10 * p.rate])
     found = {}
     filters = [(cause, effect, np.log(np.abs(effect.transfer_function(ends))))
                for cause, effect in _filters(engine, best).items()

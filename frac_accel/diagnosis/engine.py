@@ -94,10 +94,10 @@ class Engine:
     """
 
     def __init__(self, record, axis, baseline, used, base=None, candidates=(), stages=None,
-                 step=None, limit=None, passed_on=None, loose=None):
-        slices = stretches_of(record, axis)
-        self.problem = Stretches(record, axis, baseline, used, limit, slices) if slices[1:] else \
-            Problem(record, axis, baseline, used, limit)
+                 step=None, limit=None, passed_on=None, loose=None, in_own_core=()):
+        slices, given = stretches_of(record, axis), (record, axis, baseline, used, limit,
+                                                     in_own_core)
+        self.problem = Stretches(*given, slices) if slices[1:] else Problem(*given)
         self.part = None
         self.uncontested, self.best = set(), None
         self._step = step
@@ -105,8 +105,6 @@ class Engine:
         self.record, self.wanted = record, used
         # common causes by name that were identified with the model in use
         self.identified = {}
-        # causes that say what a core is that was identified with them
-        self.in_own_core = ()
         self.search = Search(self.problem, base, candidates, stages)
         # `Open` by cause: what is known of the parameters that are free in every fit
         self.loose = loose or {}
@@ -149,7 +147,7 @@ class Engine:
             rows = p.strongest(LONG // 2)
             self.part = Engine(p.part(rows), p.axis, p.baseline, p.taken(self.wanted)[rows],
                                self.search.base, self.search.candidates, self.search.stages,
-                               self._step, p.limit, self.passed_on, self.loose)
+                               self._step, p.limit, self.passed_on, self.loose, p.in_own_core)
             self.part.identified = self.identified
             return self.part.run(seed)
         self.best = self.compete(self.search.run(self.threshold, self.promises, self.noise_only,

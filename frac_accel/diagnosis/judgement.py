@@ -267,8 +267,8 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
     model = _extended(engine, {**fitted.effects, **named, **{e.cause: e for e in described}},
                       _stated(engine.problem, fitted, after / account.spread))
     p, spread = engine.problem, account.spread
-    if engine.in_own_core:
-        model, findings = in_own_core(model, findings, engine.in_own_core, AXES[p.axis])
+    if p.in_own_core:
+        model, findings = in_own_core(model, findings, p.in_own_core, AXES[p.axis])
     return Diagnosis(
         verdict, reason_of(verdict, account.error / spread, noise, account.accounted, strange)
         + set_aside(engine.aside, engine.record.valid)

@@ -167,10 +167,13 @@ class Problem:
     used : ndarray of bool, shape (n,)
         Samples that count.
     limit : TimeLimit, optional
+    in_own_core : sequence of str
+        Causes that say what a core is that nobody has stated: it is that of all axes.
     """
 
-    def __init__(self, record, axis, baseline, used, limit=None):
+    def __init__(self, record, axis, baseline, used, limit=None, in_own_core=()):
         self.record, self.axis, self.baseline = record, axis, baseline
+        self.in_own_core = in_own_core
         self.limit = limit or TimeLimit()
         self.rate = record.sampling_rate_hz
         self.time = np.arange(len(record)) / self.rate  # since this part's start
@@ -227,7 +230,8 @@ class Problem:
         These have the model in use, and of the causes only what is the same for all axes.
         """
         total = np.zeros(len(self.record))
-        common = {cause: effect for cause, effect in effects.items() if effect.common_to_axes}
+        common = {cause: effect for cause, effect in effects.items()
+                  if effect.common_to_axes or cause in self.in_own_core}
         for other, share in enumerate(shares):
             if other == self.axis or not share or not np.ptp(self.record.reference[:, other]):
                 continue

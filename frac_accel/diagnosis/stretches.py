@@ -45,16 +45,17 @@ class Stretches(Problem):
 
     Parameters
     ----------
-    record, axis, baseline, used, limit
+    record, axis, baseline, used, limit, in_own_core
         As for `Problem`, of the whole record.
     slices : list of slice
     """
 
-    def __init__(self, record, axis, baseline, used, limit, slices):
+    def __init__(self, record, axis, baseline, used, limit, in_own_core, slices):
         self.slices, self._whole, self._dated = slices, (record, used), {}
-        super().__init__(_joined(record, slices), axis, baseline, self.taken(used), limit)
-        self.parts = [Problem(record.part(rows), axis, baseline, used[rows], self.limit)
-                      for rows in slices]
+        super().__init__(_joined(record, slices), axis, baseline, self.taken(used), limit,
+                         in_own_core)
+        self.parts = [Problem(record.part(rows), axis, baseline, used[rows], self.limit,
+                              in_own_core) for rows in slices]
         self.time = np.concatenate([rows.start / self.rate + part.time
                                     for rows, part in zip(slices, self.parts)])
         self.used = np.concatenate([part.used for part in self.parts])
@@ -127,7 +128,8 @@ class Stretches(Problem):
             # what would be short belongs to the one before
             is_last = len(record) - start < 2 * _LENGTH
             rows = slice(start, len(record) if is_last else start + _LENGTH)
-            part = Problem(record.part(rows), self.axis, self.baseline, used[rows], self.limit)
+            part = Problem(record.part(rows), self.axis, self.baseline, used[rows], self.limit,
+                           self.in_own_core)
             if part.used.any():
                 found[rows] = part.errors(part.fit(fitted.effects, iterations=0))
             if rows.stop == len(record):
