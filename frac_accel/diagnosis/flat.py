@@ -76,9 +76,10 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
 def _with_a_link(engine, fitted):
     """Fits with one link more, the best first."""
     search = engine.search
-    return sorted(search.fit_all([search.begun(fitted, cause, begin) for _, cause, begin in
-                                  search.screen(fitted)[:_FITTED]], fitted.cost),
-                  key=lambda fit: fit.cost)
+    fits = search.fit_all([search.begun(fitted, cause, begin)
+                           for _, cause, begin in search.screen(fitted)[:_FITTED]], fitted.cost)
+    # one of another order may be the best
+    return sorted(map(search.varied, fits), key=lambda fit: fit.cost)
 
 
 def _with_what_stands_alone(engine, fitted):

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from exact_sines import RATE as EXACT_RATE
+from exact_sines import oscillator, record
 from rig.road import draw_drive, drive_on_road
 from scipy.signal import butter, lfilter
 
@@ -90,3 +92,35 @@ def test_what_a_model_leaves_is_in_the_band_of_what_it_corrects(seed):
     off = done.values[:, 0] - np.interp(done.stamps_ns, stamps, motion)
     covered = np.abs(off) < 2 * np.sqrt(done.variance[:, 0])
     assert 0.85 < covered.mean()
+
+
+@pytest.mark.parametrize("seed", [4141, 4142])
+def test_a_turn_has_its_angles_where_nobody_has_stated_the_gain(seed):
+    """The gain that is found for one axis is that of all: the sine of the turn is not divided by
+    its cosine."""
+    rng = np.random.default_rng(seed)
+    pitch, yaw = rng.uniform(6, 12, 2) * rng.choice([-1, 1], 2)
+    frequency, ratio, gain = rng.uniform(120, 300), rng.uniform(0.3, 0.7), rng.uniform(0.5, 2)
+    motion, felt = np.transpose([record(rng, lambda s: gain * oscillator(s, frequency, ratio),
+                                        noise=0.0) for _ in "xyz"], (1, 2, 0))
+    (sp, cp), (sy, cy) = ((np.sin(a), np.cos(a)) for a in np.radians([pitch, yaw]))
+    # Rz(yaw) Ry(pitch): from the sensor's axes to the reference's
+    turn = np.array([[cy * cp, -sy, cy * sp], [sy * cp, cy, sy * sp], [-sp, 0, cp]])
+    sensor = felt @ turn + 1e-3 * rng.standard_normal(felt.shape)
+    found = named(frac_accel.diagnose((motion, sensor), sampling_rate_hz=EXACT_RATE))
+    assert found.keys() == {"misalignment"}
+    assert found["misalignment"].effect.pitch_deg == pytest.approx(pitch, abs=0.05)
+    assert found["misalignment"].effect.yaw_deg == pytest.approx(yaw, abs=0.05)
+
+
+@pytest.mark.parametrize("seed", [4151, 4152])
+def test_a_hum_does_not_make_a_filter_look_like_an_oscillator(seed):
+    rng = np.random.default_rng(seed)
+    length, late, hum = rng.uniform(1.5e-3, 2.2e-3), rng.uniform(0.3e-3, 1e-3), rng.uniform(45, 55)
+    reference, sensor = record(rng, lambda s: np.exp(-s * (late + length / 2))
+                               * np.sinc(length * s.imag / (2 * np.pi)), band=(5, 300))
+    sensor += 0.1 * np.sin(2 * np.pi * hum * np.arange(len(sensor)) / EXACT_RATE)
+    found = named(frac_accel.diagnose((reference, sensor), sampling_rate_hz=EXACT_RATE))
+    assert found.keys() == {"linear_phase_filter", "time_delay", "tone_interference"}
+    assert found["linear_phase_filter"].effect.length_s == pytest.approx(length, rel=0.005)
+    assert found["time_delay"].effect.delay_s == pytest.approx(late, rel=0.01)
