@@ -95,9 +95,9 @@ class Engine:
 
     def __init__(self, record, axis, baseline, used, base=None, candidates=(), stages=None,
                  step=None, limit=None, passed_on=None, loose=None, in_own_core=()):
-        slices, given = stretches_of(record, axis), (record, axis, baseline, used, limit,
-                                                     in_own_core)
-        self.problem = Stretches(*given, slices) if slices[1:] else Problem(*given)
+        slices, given = stretches_of(record, axis), (record, axis, baseline, used, limit)
+        self.problem = Stretches(*given, slices, in_own_core) if slices[1:] else \
+            Problem(*given, in_own_core)
         self.part = None
         self.uncontested, self.best = set(), None
         self._step = step

@@ -45,12 +45,14 @@ class Stretches(Problem):
 
     Parameters
     ----------
-    record, axis, baseline, used, limit, in_own_core
+    record, axis, baseline, used, limit
         As for `Problem`, of the whole record.
     slices : list of slice
+    in_own_core : sequence of str
+        As for `Problem`.
     """
 
-    def __init__(self, record, axis, baseline, used, limit, in_own_core, slices):
+    def __init__(self, record, axis, baseline, used, limit, slices, in_own_core=()):
         self.slices, self._whole, self._dated = slices, (record, used), {}
         super().__init__(_joined(record, slices), axis, baseline, self.taken(used), limit,
                          in_own_core)
