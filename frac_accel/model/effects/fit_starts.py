@@ -3,6 +3,8 @@
 scipy is imported where it is used: a running corrector loads the effects, but starts no fit.
 """
 
+import dataclasses
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -62,6 +64,14 @@ def grid(effects):
     """Starts over a grid whose last effect is the weakest."""
     *stronger, weakest = effects
     return [*map(finite, stronger), Start(weakest, (weakest,), "weak")]
+
+
+def of_orders(averages, orders, most):
+    """Moving averages of other orders, up to the highest, with the same curvature at low
+    frequencies: lengths as 1 over the order's square root."""
+    return [dataclasses.replace(averages, order=order,
+                                length_s=averages.length_s * math.sqrt(averages.order / order))
+            for order in orders if 1 <= order <= most]
 
 
 def bulk_shift(simulated, measured, used):

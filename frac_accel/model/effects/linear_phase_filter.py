@@ -1,13 +1,12 @@
 """Digital filter of linear phase: moving averages, one after the other."""
 
 import dataclasses
-import math
 
 import numpy as np
 
 from ..parameters import parameter
 from .base import CONDITIONER, Effect
-from .fit_starts import matching
+from .fit_starts import matching, of_orders
 
 _MOST = 4
 
@@ -45,10 +44,7 @@ class LinearPhaseFilter(Effect):
         return np.where(small, 1 + half**2 / 6, np.sinh(safe) / safe)**self.order
 
     def alternatives(self):
-        # of the same curvature at low frequencies
-        return [dataclasses.replace(self, order=order,
-                                    length_s=self.length_s * math.sqrt(self.order / order))
-                for order in (self.order - 1, self.order + 1) if 1 <= order <= _MOST]
+        return of_orders(self, (self.order - 1, self.order + 1), _MOST)
 
     @classmethod
     def starts(cls, view):

@@ -1,13 +1,12 @@
 """Smoothing of the recorded reference."""
 
 import dataclasses
-import math
 
 import numpy as np
 
 from ..parameters import parameter
 from .base import REFERENCE, Effect
-from .fit_starts import matching
+from .fit_starts import matching, of_orders
 
 # Nearly a bell curve.
 _MOST = 16
@@ -54,11 +53,7 @@ class ReferenceSmoothing(Effect):
         return kept / np.maximum(kept**2, _LOST**2)
 
     def alternatives(self):
-        # of the same curvature at low frequencies
-        return [dataclasses.replace(self, order=order,
-                                    length_s=self.length_s * math.sqrt(self.order / order))
-                for order in (self.order - 1, self.order + 1, 2 * self.order)
-                if 1 <= order <= _MOST]
+        return of_orders(self, (self.order - 1, self.order + 1, 2 * self.order), _MOST)
 
     @classmethod
     def starts(cls, view):
