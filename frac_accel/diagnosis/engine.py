@@ -249,9 +249,11 @@ class Engine:
         if rest.cost - found.cost <= self.threshold(found):
             found = rest
         elif not any(map(acts_on_spring, found.effects.values())):
-            # several linear ones may stand for several; with forces that takes minutes
+            # several linear ones may stand for several, or two common ones for one that is odd;
+            # with forces that takes minutes
+            worse = found.cost - best.cost > self.threshold(best)
             found = self.search.grow([self._beside_base(found.effects)], self.threshold,
-                                     self.promises, self.noise_only, len(unwanted) - 1)
+                                     self.promises, self.noise_only, len(unwanted) - 1 + worse)
         # what was found beside the unwanted has met its rivals beside them only
         return self.compete(found, unwanted)
 

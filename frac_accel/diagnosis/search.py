@@ -337,7 +337,8 @@ class Search:
                 break
             self.stages.enter_round(f"searching for cause {added + 1}", SEARCHED)
             wanted = {}
-            least = best.cost - threshold(best) if done(best) else np.inf
+            # beside noise only by what is clear whatever the spectrum of what would be left
+            least = best.cost / (1 + threshold(best) / best.cost) if done(best) else np.inf
             for parent in beam:
                 for cost, cause, begin in self.screen(parent):
                     key = parent.causes | {cause}

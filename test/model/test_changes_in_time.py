@@ -7,7 +7,7 @@ from second_set_bench import RATE, Multisine, model, samples, times
 from frac_accel import Corrector, simulate
 from frac_accel.diagnosis import diagnose
 
-N = 8000  # of a shorter record, slow residuals reach no threshold
+N = 8000
 TEMPERATURE = 20 + 15 * np.sin(np.linspace(0, 7, N))
 # By cause, its parameters and what it makes of the motion q at the instants t.
 CAUSES = {
@@ -90,6 +90,18 @@ def test_found_again_and_nothing_else(cause, seed):
     for name, value in CAUSES[cause][0].items():
         assert abs(getattr(finding.effect, name) - value) < 4 * finding.std[name]
         assert finding.std[name] < 0.1 * abs(value)
+
+
+@pytest.mark.parametrize("seed", range(6, 8))
+@pytest.mark.parametrize(("cause", "begin", "names"), [
+    ("offset_drift", 0, ["offset_drift"]), ("offset_drift", 2000, ["offset", "offset_drift"]),
+    ("offset_step", 1000, ["offset_step"])])
+def test_found_in_a_short_record_whose_residual_is_nearly_all_slow(cause, begin, names, seed):
+    t, reference, values = record(cause, seed)
+    part = slice(begin, begin + int(np.random.default_rng(seed).integers(2000, 3000)))
+    found = diagnose((samples(t[part], reference[part]), samples(t[part], values[part])), model())
+    assert found.verdict == "explained"
+    assert [finding.cause for finding in found.findings] == names
 
 
 def test_a_record_without_a_change_shows_none():
