@@ -19,6 +19,9 @@ _LIKE_LAW = 30.0
 # below its highest frequency, and damping ratio of a pole below which a link shows as a resonance.
 _UNDONE, _MOTION = 0.3, 0.99
 _RESONANT = 0.19
+# Parts of the spectrum over which a density is taken, and frequencies at which filters are compared
+# where the motion fades into what is left.
+_BANDS, _FADING = 200, 8
 # Share of the output (RMS) above which what is left says that little of the sensor is understood.
 _MOST_OF = 0.5
 # Times the RMS of the linear part that is left which what is linear must take, or it may only
@@ -320,6 +323,19 @@ def _highest_hz(engine, best):
     return np.searchsorted(energy, _MOTION * energy[-1]) * engine.problem.rate / len(used)
 
 
+def _highest_seen_hz(engine, best):
+    """Frequency [Hz] up to which the motion that the sensor shows stands out of what is left."""
+    p = engine.problem
+
+    def density(values):
+        power = np.abs(np.fft.rfft((values - values[p.used].mean()) * p.used))**2
+        return uniform_filter1d(power, max(len(power) // _BANDS, 1), mode="reflect")
+    left, frequency = density(best.residual), np.fft.rfftfreq(len(p.used), 1 / p.rate)
+    seen = (density(best.output) > np.maximum(left, left.mean())) \
+        & (frequency <= (p.record.band_hz or p.rate))
+    return frequency[seen].max(initial=0.0)
+
+
 def _beyond_the_motion(engine, best):
     """Links that make fast motion larger and resonate above all of it, beside a late reference."""
     if not engine.problem.record.is_reference_late:
@@ -335,11 +351,11 @@ def _beyond_the_motion(engine, best):
 
 
 def _on_both_sides(engine, best):
-    """Filters of the sensor and of the reference that undo each other at an end of the band, or at
-    that of the motion."""
-    p = engine.problem
-    ends = 2j * np.pi * np.array([0.01 / p.time[-1], _highest_hz(engine, best), 10 * p.rate])
-    found = {}
+    """Filters of the sensor and of the reference that undo each other at an end of the band, or
+    where the motion ends."""
+    p, found = engine.problem, {}
+    fading = np.linspace(_highest_hz(engine, best), _highest_seen_hz(engine, best), _FADING)
+    ends = 2j * np.pi * np.array([0.01 / p.time[-1], *fading, 10 * p.rate])
     filters = [(cause, effect, np.log(np.abs(effect.transfer_function(ends))))
                for cause, effect in _filters(engine, best).items()
                if is_link(effect) and _is_smooth(effect)]

@@ -18,6 +18,8 @@ _PART = 0.15
 # Turn [degrees] that is worth telling, and standard uncertainties that it must be away from none.
 _TURNED_DEG = 1.0
 _SIGNIFICANT = 3.0
+# Gain of an axis, over that of all, below which the sensor does not show it.
+_SHOWN = 0.3
 # Share of an axis' power that the others must explain for it to be said that it follows them.
 _EXPLAINED = 0.2
 # Gain in what a mirrored sensor leaves, over what a turned one leaves, by which it is mirrored.
@@ -40,7 +42,7 @@ class Orientation:
     explained : ndarray, shape (3,)
         Share of each sensor axis' power that the turned reference explains; NaN without motion.
     moving : ndarray of bool, shape (3,)
-        The reference's axes that move.
+        The reference's axes that move, as far as the sensor shows it.
     mirrored : bool
         Whether an odd number of axes is reversed, which no rotation does.
     offset_s : float
@@ -132,11 +134,11 @@ class Orientation:
         Raises
         ------
         FracAccelError
-            If only one axis moved, so that the rotation is not known.
+            If the sensor shows motion along one axis only, so that the rotation is not known.
         """
         if not np.isfinite(self.rotation).all():
-            raise FracAccelError("the rotation is not known: the reference moves along one axis "
-                                 "only")
+            raise FracAccelError("the rotation is not known: the sensor shows motion along one "
+                                 "axis of the reference only")
         return Samples.of(samples.stamps_ns, samples.values @ self.rotation,
                           samples.variance @ self.rotation**2, samples.frame_id)
 
@@ -191,6 +193,12 @@ def _oriented(record):
     if not power.max() > 0 or not np.trace(other.sum(axis=0)) > 0:
         return None
     rotation, gain, mirrored = _fit(own.sum(axis=0), shared.sum(axis=0), moving)
+    # an axis of the sensor may be dead: where the motion along it points, nothing shows then
+    gains = np.sum(rotation * shared.sum(axis=0).T, axis=0) / np.maximum(power, 1e-300)
+    shown = moving & (gains > _SHOWN * gain)
+    if shown.any() and not np.array_equal(shown, moving):
+        moving = shown
+        rotation, gain, mirrored = _fit(own.sum(axis=0), shared.sum(axis=0), moving)
     tries = [_fit(own.sum(axis=0) - own[i], shared.sum(axis=0) - shared[i], moving, mirrored)
              for i in range(BLOCKS)]
     spread = np.sqrt(BLOCKS - 1)

@@ -47,6 +47,15 @@ def test_uncertainties_are_those_of_a_monte_carlo():
     assert np.mean([one.gain_std for one in found]) == pytest.approx(gains.std(), rel=0.4)
 
 
+def test_a_sensor_with_a_dead_axis_is_not_turned_by_angles_that_nothing_shows():
+    reference, sensor = turned_record(np.random.default_rng(0), [[0, 0, 1], [0, -1, 0], [1, 0, 0]],
+                                      moving=(0, 1))
+    values = sensor.values.copy()
+    values[:, 1] = 0.0
+    with pytest.raises(FracAccelError, match="axes are exchanged: sensor z follows reference x"):
+        diagnose((reference, Samples.of(sensor.stamps_ns, values)))
+
+
 @pytest.mark.parametrize("turn, words", [
     ([[0, -1, 0], [1, 0, 0], [0, 0, 1]],
      "sensor x follows reference -y, sensor y follows reference x, sensor z follows reference z"),
