@@ -25,6 +25,7 @@ from .finding import Diagnosis, Finding, insufficient
 from .flat import flat_instead
 from .judgement import judge
 from .leftover import related
+from .read_off import drowned
 from .screened import screened
 from .spikes import spikes
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
@@ -127,7 +128,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         model, stds, seed = _classical(record, axis, used, limit)
     # the common lag of the stamps is a median of scattered ones
     loose = _left_open(model.axis(axis), stds, 1.25 * found.jitter_rms_s / np.sqrt(found.samples))
-    engine = functools.partial(
+    begin = functools.partial(
         Engine, record.comparable(column, used), column, model, base={
             **{cause: entry.effect for cause, entry in loose.items()},
             **{cause: effect for cause, effect in shown.items() if effect.of_reference}},
@@ -137,7 +138,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         passed_on=None if noise and noise.bends else noise, loose=loose,
         in_own_core=[cause for cause, entry in loose.items()
                      if seed is not None and entry.effect.restates_core])
-    engine, stray = _without_spikes(engine, used, stray, record.reference[:, column])
+    engine, stray = _without_spikes(begin, used, stray, record.reference[:, column])
     if stray.any():
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
@@ -145,6 +146,8 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     engine.identified = {cause: effect for cause, effect in (seed or {}).items() if effect.everyday}
     _require_relation(engine, axis, seed)
     best = engine.run(seed)
+    if engine.part is None:
+        engine, best = _without_drowned(begin, engine, best, found, shown, source[1], seed)
     stages.enter("judging what was found", JUDGED)
     judged = judge(engine, best, found, shown, source[1], noise_std)
     if orientation:
@@ -203,6 +206,19 @@ def _without_spikes(engine, used, stray, reference):
     more = p.put_back(inside & spikes(first.search.baseline.residual,
                                       p.taken(reference)), np.zeros(len(used), bool))
     return (engine(used=used & ~more) if more.any() else first), stray | more
+
+
+def _without_drowned(begin, engine, best, found, shown, sensor, seed):
+    """Engine whose fits leave out the samples in which what the record shows by itself drowns all
+    else, and its best set; those given where there are none."""
+    hidden = drowned(engine, best, found, shown, sensor)
+    if not hidden.any():
+        return engine, best
+    other = begin(used=engine.wanted & ~hidden)
+    other.spikes, other.aside = engine.spikes | hidden, engine.aside & ~hidden
+    other.drowned = hidden
+    other.identified = engine.identified
+    return other, other.run(seed)
 
 
 def _shown(found, record, column, used):

@@ -112,6 +112,8 @@ class Engine:
         self.passed_on = passed_on
         # what counts in no fit, since a signal was at fault there
         self.aside = self.spikes = np.zeros(len(record), bool)
+        # samples, among those spikes, in which what the record shows by itself drowns all else
+        self.drowned = np.zeros(len(record), bool)
         self.held_out_rows = self.problem.used & held_out(self.problem.record.reference[:, axis])
         self._learnt, self._budgets, self._structures, self._left = {}, {}, {}, {}
         # what the numerics of the simulation may still be wrong by
@@ -377,9 +379,11 @@ class Engine:
         """`Budget` of what a fit leaves, of all samples that are there."""
         return _once(self._budgets, fitted, self._budget_of)
 
-    def _budget_of(self, fitted):
-        p = self.problem
-        residual = np.where(p.record.valid, p.measured - fitted.output, 0.0)
+    def _budget_of(self, fitted, beside_drowned=False):
+        p, rows = self.problem, self.problem.record.valid
+        if beside_drowned:
+            rows = rows & ~p.taken(self.drowned)
+        residual = np.where(rows, p.measured - fitted.output, 0.0)
         residual[:p.edge] = residual[len(residual) - p.edge:] = 0.0
         division = self._division
         return division.of(*(values[self._parted] for values in
@@ -389,12 +393,13 @@ class Engine:
         """Parts of what a fit leaves that are no noise: (share, part), the largest first.
 
         What rounding to a coarse lattice makes of the simulated values is taken off: it follows the
-        motion.
+        motion. Samples in which something drowns all else do not count.
         """
         return _once(self._structures, fitted, self._structure_of)
 
     def _structure_of(self, fitted):
-        parts, step = self.budget(fitted).parts, self.coarse_step(fitted)
+        budget = self._budget_of(fitted, True) if self.drowned.any() else self.budget(fitted)
+        parts, step = budget.parts, self.coarse_step(fitted)
         rounded = {}
         if step:
             p = self.problem

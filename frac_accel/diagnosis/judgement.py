@@ -271,7 +271,7 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
         model, findings = in_own_core(model, findings, p.in_own_core, AXES[p.axis])
     return Diagnosis(
         verdict, reason_of(verdict, account.error / spread, noise, account.accounted, strange)
-        + set_aside(engine.aside, engine.record.valid)
+        + set_aside(engine.aside, engine.drowned, engine.record.valid)
         + description_words([*described.values()], unnamed)
         + hidden_words(account.own, account.error),
         {"rmse": account.before, "nrmse": account.before / spread, "noise_rms": left.noise_rms},
@@ -349,7 +349,9 @@ def _account(engine, fitted, findings, noise):
     # the record is all of it, not only the part that is held out
     errors = p.errors(fitted)
     error = max(after, _rms(errors, engine.wanted & np.isfinite(errors)))
-    everywhere = _rms(errors, (engine.wanted | engine.aside) & np.isfinite(errors))
+    # what is named may drown all else
+    hidden = False if any(f.effect.read_off for f in findings) else engine.drowned
+    everywhere = _rms(errors, (engine.wanted | engine.aside | hidden) & np.isfinite(errors))
 
     def is_covered(rms):
         """Whether what the reference's own noise does not make is accounted for."""

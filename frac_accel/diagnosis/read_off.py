@@ -78,8 +78,44 @@ def _moving_share(reference):
 
 
 def read_off(engine, fitted, found, shown, sensor):
-    """Findings that the record shows by itself: limits, lattice, stamps."""
-    p, findings = engine.problem, []
+    """Findings that the record shows by itself: limits, lattice, stamps.
+
+    Parameters
+    ----------
+    engine : Engine
+    fitted : Fitted
+    found : Integrity
+    shown : dict of str to Effect
+        What `of_record` found, by cause.
+    sensor : Samples
+        The sensor's samples as they were recorded.
+    """
+    findings = []
+    # what the size of a residual tells presumes that it is noise, or bursts of it
+    is_noise = all(part == "bursts" for _, part in engine.structure(fitted)) \
+        and _moving_share(engine.problem.record.reference[:, engine.problem.axis]) > _LASTS
+    for cause, effect, reading in _readings(engine, fitted, found, shown, sensor):
+        if cause not in shown and not is_noise:
+            continue
+        g = engine.held_out(fitted, cause) if cause in engine.search.base \
+            else gain(reading.before, reading.after)
+        if g.is_relevant:
+            findings.append(Finding(effect, reading.std, certainty(g), [], [
+                reading.evidence, *gain_words(cause, g, np.inf, [])], g))
+    return findings
+
+
+def drowned(engine, fitted, found, shown, sensor):
+    """Mask, shape (n,), of the samples in which something that the record shows by itself drowns
+    whatever else may be wrong; arguments as those of `read_off`."""
+    masks = [reading.drowned for _, _, reading in
+             _readings(engine, fitted, found, shown, sensor) if reading.drowned is not None]
+    return np.any(masks, axis=0) if masks else np.zeros(len(engine.problem.record), bool)
+
+
+def _readings(engine, fitted, found, shown, sensor):
+    """(Cause, effect, `Reading`) of each that the record shows by itself."""
+    p = engine.problem
     here = p.coherent
     record = p.part(here)
     rows = record.valid.copy()
@@ -88,18 +124,7 @@ def read_off(engine, fitted, found, shown, sensor):
                 rows & p.used[here], rows & p.taken(engine.spikes)[here],
                 engine.coarse_step(fitted) is not None,
                 {entry["part"]: entry["share"] for entry in engine.budget(fitted).parts})
-    # what the size of a residual tells presumes that it is noise, or bursts of it
-    parts = engine.structure(fitted)
-    is_noise = all(part == "bursts" for _, part in parts) \
-        and _moving_share(p.record.reference[:, p.axis]) > _LASTS
     for cause, cls in known_effects().items():
         recognised = cls.recognised(seen, shown.get(cause)) if cls.read_off else None
-        if recognised is None or (cause not in shown and not is_noise):
-            continue
-        effect, reading = recognised
-        g = engine.held_out(fitted, cause) if cause in engine.search.base \
-            else gain(reading.before, reading.after)
-        if g.is_relevant:
-            findings.append(Finding(effect, reading.std, certainty(g), [], [
-                reading.evidence, *gain_words(cause, g, np.inf, [])], g))
-    return findings
+        if recognised is not None:
+            yield cause, *recognised

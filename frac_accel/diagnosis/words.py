@@ -53,11 +53,12 @@ def reason_of(verdict, nrmse, noise, accounted, strange):
                          "noise (--noise-std)"}[verdict]
 
 
-def set_aside(aside, valid):
+def set_aside(aside, drowned, valid):
     """Words for the samples that were not judged."""
-    share = aside.sum() / valid.sum()
-    return f"; {aside.sum()} samples ({share:.2%}) do not count: a signal stood still or had " \
-           "spikes there" if aside.any() else ""
+    return "".join(
+        f"; {rows.sum()} samples ({rows.sum() / valid.sum():.2%}) do not count: {why} there"
+        for rows, why in ((aside, "a signal stood still or had spikes"),
+                          (drowned, "bursts drown all else")) if rows.any())
 
 
 def description_words(described, unnamed):

@@ -68,6 +68,18 @@ def test_neither_where_it_is_something_else(kind):
     assert not {"sampling_jitter", "interference_bursts", "quantization"} & set(found(kind, 7))
 
 
+@pytest.mark.parametrize("seed", (10, 11))
+@pytest.mark.parametrize("cause", ["offset_step", "sensitivity_error"])
+def test_what_bursts_drown_is_found_beside_them(cause, seed):
+    rng = np.random.default_rng(seed)
+    t, reference, values = record("", seed)
+    values = values + 0.02 * (t > rng.uniform(5, 12)) if cause == "offset_step" else 1.005 * values
+    values += rng.uniform(3, 6) * values.std() * bursts(rng, 0.03) * rng.normal(size=N)
+    found = diagnose((samples(t, reference), samples(t, values)), model())
+    assert {finding.cause for finding in found.findings} == {cause, "interference_bursts"}
+    assert found.verdict == "explained"
+
+
 def test_a_burst_may_be_anywhere_so_that_every_sample_is_worth_less():
     t, reference, values = record("interference_bursts", 1)
     made = samples(t, values)

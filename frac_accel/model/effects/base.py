@@ -58,12 +58,15 @@ class Reading(NamedTuple):
     before, after : ndarray, shape (m,)
         Errors of the simulation without and with the cause, in the samples' order.
     evidence : str
+    drowned : ndarray of bool, shape (n,), optional
+        Samples of the record in which it drowns whatever else may be wrong.
     """
 
     std: dict
     before: np.ndarray
     after: np.ndarray
     evidence: str
+    drowned: np.ndarray | None = None
 
 
 class Open(NamedTuple):

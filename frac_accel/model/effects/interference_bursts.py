@@ -79,9 +79,13 @@ class InterferenceBursts(Effect):
         stds = {"share": float(np.sqrt(share * (1 - share) * max(2 * length, 1) / len(error))),
                 "rms": rms / np.sqrt(2 * share * len(error)) * loud / (loud - noise)}
         after = np.where(inside, error * np.sqrt(noise / loud), error)
+        drowned = np.zeros(len(used), bool)
+        # its ends are too short for the power of neighbours
+        drowned[used] = np.convolve(inside, np.ones(_WINDOW), "same") > 0.5
         return cls(float(share), rms), Reading(stds, error, after, (
             f"{len(starts)} bursts of {length:.3g} samples on average, "
-            f"{np.sqrt(loud / noise):.3g} times as loud as the rest, whatever the motion does"))
+            f"{np.sqrt(loud / noise):.3g} times as loud as the rest, whatever the motion does"),
+            drowned)
 
 
 def _near(missing):
