@@ -33,7 +33,12 @@ class Gain:
     @property
     def is_relevant(self):
         """Whether it matters, and is above zero for certain."""
-        return self.reduction > _RELEVANT and self.ci95[0] > 0
+        return self.matters and self.ci95[0] > 0
+
+    @property
+    def matters(self):
+        """Whether it takes away enough."""
+        return self.reduction > _RELEVANT
 
     @property
     def taken(self):

@@ -223,8 +223,8 @@ def _mirrored(engine, best):
         if cause in best.effects and cause not in engine.search.base \
                 and cls.mirrored(best.effects[cause]) is not None:
             # fitted, unless it is known
-            engine.search.fit_all([{**{c: e for c, e in best.effects.items() if c != cause},
-                                    cls.cause: cls.mirrored(best.effects[cause])}])
+            engine.search.fit_from({**{c: e for c, e in best.effects.items() if c != cause},
+                                    cls.cause: cls.mirrored(best.effects[cause])})
     for fit in engine.search.fits.values():
         turned = [effect.mirrors for cause, effect in fit.effects.items()
                   if cause not in best.effects]

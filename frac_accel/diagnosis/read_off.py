@@ -99,7 +99,7 @@ def read_off(engine, fitted, found, shown, sensor):
             continue
         g = engine.held_out(fitted, cause) if cause in engine.search.base \
             else gain(reading.before, reading.after)
-        if g.is_relevant:
+        if g.is_relevant or (reading.evident and g.matters):
             findings.append(Finding(effect, reading.std, certainty(g), [], [
                 reading.evidence, *gain_words(cause, g, np.inf, [])], g))
     return findings

@@ -107,6 +107,14 @@ class Search:
         self._keep(self.problem.fit(effects))
         return self.fits[frozenset(effects)]
 
+    def fit_from(self, effects):
+        """Fit a set, anew where what is known of it is worse than these effects are: that had ended
+        in another valley. What is without bound is left."""
+        known = self.fits.get(frozenset(effects))
+        if known is not None and self.problem.cost(effects) < known.cost:
+            del self.fits[known.causes]
+        self.fit_all([effects])
+
     def _keep(self, fit):
         self.fits.pop(fit.causes, None)
         self.fits[fit.causes] = fit

@@ -80,6 +80,17 @@ def test_what_bursts_drown_is_found_beside_them(cause, seed):
     assert found.verdict == "explained"
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_crest_that_is_cut_off_is_clipped_be_it_the_only_one(seed):
+    rng = np.random.default_rng([20, seed])
+    t, sine = times(N / RATE), Multisine(rng, band_hz=(0.5, 8.0))
+    values = sine.motion(t) + 0.005 * rng.normal(size=N)
+    limit = np.quantile(values, 1 - rng.integers(20, 40) / N)
+    for sensor, names in ((values, set()), (np.minimum(values, limit), {"clipping"})):
+        found = diagnose((samples(t, sine.acceleration(t)), samples(t, sensor)), model())
+        assert {finding.cause for finding in found.findings} == names
+
+
 def test_a_burst_may_be_anywhere_so_that_every_sample_is_worth_less():
     t, reference, values = record("interference_bursts", 1)
     made = samples(t, values)

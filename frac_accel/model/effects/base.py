@@ -60,6 +60,8 @@ class Reading(NamedTuple):
     evidence : str
     drowned : ndarray of bool, shape (n,), optional
         Samples of the record in which it drowns whatever else may be wrong.
+    evident : bool
+        Whether it is certain, be it seen in one stretch of the record only.
     """
 
     std: dict
@@ -67,6 +69,7 @@ class Reading(NamedTuple):
     after: np.ndarray
     evidence: str
     drowned: np.ndarray | None = None
+    evident: bool = False
 
 
 class Open(NamedTuple):

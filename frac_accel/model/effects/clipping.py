@@ -13,6 +13,9 @@ from .base import CLIPPING, Effect, Reading
 _NEAR = 0.8
 _TELL = 20
 _LARGER = 3.0
+# Share of the samples at a limit whose motion must go beyond it, and how far (RMS) beside what is
+# left elsewhere, for one stretch to be enough.
+_BEYOND, _FAR = 0.9, 5.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +58,16 @@ class Clipping(Effect):
         return Reading({"lower": resolution, "upper": resolution},
                        (seen.measured - seen.output)[seen.rows],
                        (seen.measured - self.simulate(seen.output, None))[seen.rows],
-                       "; ".join(words for words in seen.found.words if "limit" in words))
+                       "; ".join(words for words in seen.found.words if "limit" in words),
+                       evident=self._goes_beyond(seen))
+
+    def _goes_beyond(self, seen):
+        """Whether the motion goes on far beyond where the values stand."""
+        at = seen.rows & self.spoiled(seen.measured)
+        error = seen.measured - seen.output
+        beyond = at & (error * np.sign(seen.measured) < 0)
+        return bool(beyond.sum() >= _BEYOND * at.sum()
+                    and np.std(error[seen.used]) * _FAR < np.sqrt(np.mean(error[at]**2)))
 
     def _bends(self, seen):
         free = seen.used & ~self.spoiled(seen.measured)
