@@ -118,7 +118,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     noise = reference_noise(record, column, used, _stated_noise(source[0], column))
     if noise and noise.bends:
         found = dataclasses.replace(found, reference_noise=noise, words=[*found.words, noise.words])
-    shown, used, stray = _shown(found, record, column, used)
+    shown, used, stray, at_limit = _shown(found, record, column, used)
     poor = _too_poor(record, column, used, model)
     if poor:
         return insufficient(poor, model, found)
@@ -143,13 +143,14 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
                            "not: spikes, which count in no fit")
     engine.spikes, engine.aside = stray, stray | (record.valid & ~moving)
+    engine.at_limit = at_limit
     engine.identified = {cause: effect for cause, effect in (seed or {}).items() if effect.everyday}
     _require_relation(engine, axis, seed)
     best = engine.run(seed)
     if engine.part is None:
-        engine, best = _without_drowned(begin, engine, best, found, shown, source[1], seed)
+        engine, best = _without_drowned(begin, engine, best, found, shown, seed)
     stages.enter("judging what was found", JUDGED)
-    judged = judge(engine, best, found, shown, source[1], noise_std)
+    judged = judge(engine, best, found, shown, noise_std)
     if orientation:
         judged = with_turn(judged, engine, orientation)
     return dataclasses.replace(judged, screened=screened(engine)) if screening else judged
@@ -208,30 +209,31 @@ def _without_spikes(engine, used, stray, reference):
     return (engine(used=used & ~more) if more.any() else first), stray | more
 
 
-def _without_drowned(begin, engine, best, found, shown, sensor, seed):
+def _without_drowned(begin, engine, best, found, shown, seed):
     """Engine whose fits leave out the samples in which what the record shows by itself drowns all
     else, and its best set; those given where there are none."""
-    hidden = drowned(engine, best, found, shown, sensor)
+    hidden = drowned(engine, best, found, shown)
     if not hidden.any():
         return engine, best
     other = begin(used=engine.wanted & ~hidden)
     other.spikes, other.aside = engine.spikes | hidden, engine.aside & ~hidden
-    other.drowned = hidden
+    other.drowned, other.at_limit = hidden, engine.at_limit
     other.identified = engine.identified
     return other, other.run(seed)
 
 
 def _shown(found, record, column, used):
-    """Causes that the record shows by itself; the samples that count with these; its spikes."""
+    """Causes that the record shows by itself; the samples that count with these; its spikes; and
+    those that say nothing of other causes."""
     measured = record.sensor[:, column]
     effects = {cause: effect.of_record(found, measured)
                for cause, effect in known_effects().items() if effect.read_off}
     effects = {cause: effect for cause, effect in effects.items() if effect is not None}
     stray = used & spikes(measured, record.reference[:, column])
-    used = used & ~stray
+    silent = np.zeros(len(used), bool)
     for effect in effects.values():
-        used &= ~effect.spoiled(measured)
-    return effects, used, stray
+        silent |= record.instants_of(effect.spoiled, column)
+    return effects, used & ~stray & ~silent, stray, silent
 
 
 def _too_poor(record, column, used, model):

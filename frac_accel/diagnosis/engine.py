@@ -112,12 +112,18 @@ class Engine:
         self.passed_on = passed_on
         # what counts in no fit, since a signal was at fault there
         self.aside = self.spikes = np.zeros(len(record), bool)
-        # samples, among those spikes, in which what the record shows by itself drowns all else
-        self.drowned = np.zeros(len(record), bool)
+        # samples that say nothing of other causes, by what the record shows by itself: those at a
+        # limit, and those in which it drowns all else
+        self.at_limit = self.drowned = np.zeros(len(record), bool)
         self.held_out_rows = self.problem.used & held_out(self.problem.record.reference[:, axis])
         self._learnt, self._budgets, self._structures, self._left = {}, {}, {}, {}
         # what the numerics of the simulation may still be wrong by
         self.floor = 3e-5 * float(np.std(record.sensor[used, axis]))
+
+    @property
+    def silent(self):
+        """Samples of the record that say nothing of other causes."""
+        return self.at_limit | self.drowned
 
     def threshold(self, fitted):
         """Cost by which a further parameter must improve on a fit."""
@@ -272,7 +278,7 @@ class Engine:
 
     def rivals(self, best, cause):
         """Sets without a cause, no larger than the best, by score; (margin, causes)."""
-        if self.part and cause in self.part.best.effects:
+        if self.comparing(cause) is not self:
             return self.part.rivals(self.part.best, cause)
         variance = best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
         own = self._evidence(best, variance)
@@ -282,6 +288,10 @@ class Engine:
         # a hollow one that is close says the same in other words
         return [entry for entry in sorted(found, key=lambda entry: entry[0])
                 if entry[0] > _CLOSE or not self.hollow(self.search.fits[entry[1]])]
+
+    def comparing(self, cause):
+        """The engine in which a cause has met its rivals: that of a long record's part, or this."""
+        return self.part if self.part and cause in self.part.best.effects else self
 
     def instead_of_moved(self, fitted, own):
         """A cause that says more than what the model in use leaves open does by moving, or None.
@@ -375,15 +385,19 @@ class Engine:
             return 0.0
         return (self.by_reference(fitted) / max(self.rms(fitted.residual), 1e-300))**2
 
+    def budget_beside_limits(self, fitted):
+        """`budget` without the samples at a limit: of a model that has it."""
+        return self._budget_of(fitted, self.at_limit) if self.at_limit.any() \
+            else self.budget(fitted)
+
     def budget(self, fitted):
         """`Budget` of what a fit leaves, of all samples that are there."""
-        return _once(self._budgets, fitted, self._budget_of)
+        return _once(self._budgets, fitted,
+                     lambda fitted: self._budget_of(fitted, np.zeros(len(self.record), bool)))
 
-    def _budget_of(self, fitted, beside_drowned=False):
-        p, rows = self.problem, self.problem.record.valid
-        if beside_drowned:
-            rows = rows & ~p.taken(self.drowned)
-        residual = np.where(rows, p.measured - fitted.output, 0.0)
+    def _budget_of(self, fitted, hidden):
+        p = self.problem
+        residual = np.where(p.record.valid & ~p.taken(hidden), p.measured - fitted.output, 0.0)
         residual[:p.edge] = residual[len(residual) - p.edge:] = 0.0
         division = self._division
         return division.of(*(values[self._parted] for values in
@@ -393,12 +407,12 @@ class Engine:
         """Parts of what a fit leaves that are no noise: (share, part), the largest first.
 
         What rounding to a coarse lattice makes of the simulated values is taken off: it follows the
-        motion. Samples in which something drowns all else do not count.
+        motion. Samples that say nothing of other causes do not count.
         """
         return _once(self._structures, fitted, self._structure_of)
 
     def _structure_of(self, fitted):
-        budget = self._budget_of(fitted, True) if self.drowned.any() else self.budget(fitted)
+        budget = self._budget_of(fitted, self.silent) if self.silent.any() else self.budget(fitted)
         parts, step = budget.parts, self.coarse_step(fitted)
         rounded = {}
         if step:
@@ -451,9 +465,11 @@ class Engine:
         return float(np.sqrt(np.mean(values[self.problem.used]**2)))
 
     def is_accounted(self, fitted, noise):
-        """Whether what a fit leaves is little, or no more than `EstablishedNoise`."""
-        p = self.problem
-        return is_accounted(self.rms(fitted.residual), float(np.std(p.measured[p.used])), noise)
+        """Whether what a fit leaves beside coarse rounding is little, or no more than
+        `EstablishedNoise`."""
+        p, rounding = self.problem, (self.coarse_step(fitted) or 0.0)**2 / 12
+        left = np.sqrt(max(fitted.cost / p.count - rounding, 0.0))
+        return is_accounted(left, float(np.std(p.measured[p.used])), noise)
 
     def learnt(self, fitted):
         """The same causes, fitted to the learning part of the record only, beside all that the

@@ -52,7 +52,7 @@ _OTHERS = 0.25
 _MOVED = 5.0
 
 
-def judge(engine, best, found, shown, sensor, noise_std=None):
+def judge(engine, best, found, shown, noise_std=None):
     """Verdict on the best set of causes.
 
     Parameters
@@ -62,8 +62,6 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
     found : Integrity
     shown : dict of str to Effect
         Causes that the record shows by itself.
-    sensor : Samples
-        The sensor's samples as they were recorded.
     noise_std : float, optional
         Standard deviation of the noise, where somebody states it [output units].
 
@@ -83,8 +81,7 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
     best, gains, left, noise, stds, doubts = settled
     doubted |= more
     findings, tied = [], {}
-    clear = _CLEAR if engine.is_accounted(best, noise) \
-        else max(_CLEAR, _NEARLY * engine.problem.count)
+    nearly = 0.0 if engine.is_accounted(best, noise) else _NEARLY
     suspects = [_suspect({cause}, 0.0, words) for cause, words in doubted.items()]
     most = max((g.taken for g in gains.values()), default=0.0)
     for cause, g in gains.items():
@@ -94,6 +91,7 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
                   if (not mirror or mirror not in causes) and not causes & doubted.keys()]
         alone = engine.stands_alone(best, cause, g.taken)
         margin, other = (np.inf, frozenset()) if alone or not rivals else rivals[0]
+        clear = max(_CLEAR, nearly * engine.comparing(cause).problem.count)
         instead = sorted(other - best.causes)
         entry = Finding(best.effects[cause], stds[cause],
                         certainty(g) if alone else _confidence(margin * _CLEAR / clear),
@@ -111,7 +109,7 @@ def judge(engine, best, found, shown, sensor, noise_std=None):
             suspects.append(_suspect({cause, *instead}, margin, "another cause explains as much"))
             tied[cause] = other
     return _verdict(engine, best, left, findings, suspects, tied, found, noise,
-                    lambda fitted: read_off(engine, fitted, found, shown, sensor))
+                    lambda fitted: read_off(engine, fitted, found, shown))
 
 
 class Examined(NamedTuple):
@@ -281,7 +279,8 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
         Evidence.of(engine, best, fitted, named),
         noise.as_dict(), p.limit.summary(),
         [*engine.budget(engine.search.baseline).as_list("baseline"),
-         *engine.budget(fitted).as_list("extended")])
+         *(engine.budget_beside_limits if any(f.effect.read_off for f in findings)
+           else engine.budget)(fitted).as_list("extended")])
 
 
 def _stated(problem, fitted, nrmse):
@@ -349,8 +348,8 @@ def _account(engine, fitted, findings, noise):
     # the record is all of it, not only the part that is held out
     errors = p.errors(fitted)
     error = max(after, _rms(errors, engine.wanted & np.isfinite(errors)))
-    # what is named may drown all else
-    hidden = False if any(f.effect.read_off for f in findings) else engine.drowned
+    # what is named may hide all else
+    hidden = False if any(f.effect.read_off for f in findings) else engine.silent
     everywhere = _rms(errors, (engine.wanted | engine.aside | hidden) & np.isfinite(errors))
 
     def is_covered(rms):

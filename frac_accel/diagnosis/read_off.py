@@ -26,8 +26,8 @@ class Seen:
     ----------
     record : Record
     found : Integrity
-    sensor : Samples
-        The sensor's samples as they were recorded.
+    axis : int
+        Column of the record's axis.
     measured, output : ndarray, shape (n,)
     rows, used : ndarray of bool, shape (n,)
         Samples that are there, and those of them that the fit counted.
@@ -41,7 +41,7 @@ class Seen:
 
     record: object
     found: object
-    sensor: object
+    axis: int
     measured: np.ndarray
     output: np.ndarray
     rows: np.ndarray
@@ -56,7 +56,8 @@ class Seen:
                                     self.used, self.found.step))
 
     def at_stamps(self):
-        """Instants with a sample, and the simulated output at the stamps that these carry."""
+        """Samples of the sensor's topic with an instant, these instants, and the simulated output
+        at the stamps that they carry."""
         stamps = self.record.topics[1].stamps_ns
         rate = self.record.sampling_rate_hz
         place = (stamps - self.record.start_ns) * 1e-9 * rate
@@ -64,8 +65,18 @@ class Seen:
         good = (slot >= 0) & (slot < len(self.output))
         fine = resample_poly(self.output, 4, 1)
         spline = CubicSpline(np.arange(len(fine)) / 4, fine)
-        return slot[good], spline(np.clip(place[good] - self.record.lag_s * rate, 0,
-                                          len(self.output) - 1))
+        return good, slot[good], spline(np.clip(place[good] - self.record.lag_s * rate, 0,
+                                                len(self.output) - 1))
+
+    def as_recorded(self):
+        """Values before they were resampled, the simulated output at their instants, and which of
+        them lie where the fit counted samples."""
+        if "sensor" not in self.record.resampled:
+            return self.measured[self.rows], self.output[self.rows], self.used[self.rows]
+        good, slot, output = self.at_stamps()
+        there = self.rows[slot]
+        values = self.record.topics[1].values[good, self.axis]
+        return values[there], output[there], self.used[slot[there]]
 
 
 def _moving_share(reference):
@@ -77,7 +88,7 @@ def _moving_share(reference):
     return float(power.mean()**2 / max(np.mean(power**2), 1e-300))
 
 
-def read_off(engine, fitted, found, shown, sensor):
+def read_off(engine, fitted, found, shown):
     """Findings that the record shows by itself: limits, lattice, stamps.
 
     Parameters
@@ -87,14 +98,12 @@ def read_off(engine, fitted, found, shown, sensor):
     found : Integrity
     shown : dict of str to Effect
         What `of_record` found, by cause.
-    sensor : Samples
-        The sensor's samples as they were recorded.
     """
     findings = []
     # what the size of a residual tells presumes that it is noise, or bursts of it
     is_noise = all(part == "bursts" for _, part in engine.structure(fitted)) \
         and _moving_share(engine.problem.record.reference[:, engine.problem.axis]) > _LASTS
-    for cause, effect, reading in _readings(engine, fitted, found, shown, sensor):
+    for cause, effect, reading in _readings(engine, fitted, found, shown):
         if cause not in shown and not is_noise:
             continue
         g = engine.held_out(fitted, cause) if cause in engine.search.base \
@@ -105,22 +114,22 @@ def read_off(engine, fitted, found, shown, sensor):
     return findings
 
 
-def drowned(engine, fitted, found, shown, sensor):
+def drowned(engine, fitted, found, shown):
     """Mask, shape (n,), of the samples in which something that the record shows by itself drowns
     whatever else may be wrong; arguments as those of `read_off`."""
     masks = [reading.drowned for _, _, reading in
-             _readings(engine, fitted, found, shown, sensor) if reading.drowned is not None]
+             _readings(engine, fitted, found, shown) if reading.drowned is not None]
     return np.any(masks, axis=0) if masks else np.zeros(len(engine.problem.record), bool)
 
 
-def _readings(engine, fitted, found, shown, sensor):
+def _readings(engine, fitted, found, shown):
     """(Cause, effect, `Reading`) of each that the record shows by itself."""
     p = engine.problem
     here = p.coherent
     record = p.part(here)
     rows = record.valid.copy()
     rows[:64] = rows[-64:] = False
-    seen = Seen(record, found, sensor, p.measured[here], fitted.output[here], rows,
+    seen = Seen(record, found, p.axis, p.measured[here], fitted.output[here], rows,
                 rows & p.used[here], rows & p.taken(engine.spikes)[here],
                 engine.coarse_step(fitted) is not None,
                 {entry["part"]: entry["share"] for entry in engine.budget(fitted).parts})

@@ -20,6 +20,8 @@ _FAR_PERIODS = 3.0
 # Lead of the sensor that is told: standard uncertainties, and seconds.
 _SIGNIFICANT = 4.0
 _LATE_S = 0.01
+# Instants on either side of a sample of another rate that it changes.
+_REACHED = 4
 # Steps of the reference [of its standard deviation] that are worth telling, and how near to a
 # number of two digits one is round.
 _COARSE = 0.01
@@ -121,6 +123,25 @@ class Record:
             values[:, column] = within(values[:, column], self.sampling_rate_hz, self.band_hz,
                                        wrong, missing)
         return dataclasses.replace(self, reference=reference, sensor=sensor)
+
+    def instants_of(self, which, column):
+        """Mask, shape (n,): instants at which the sensor's value comes from some of its samples.
+
+        Parameters
+        ----------
+        which : callable
+            The mask of values as they were recorded that is meant.
+        column : int
+        """
+        if "sensor" not in self.resampled:
+            return which(self.sensor[:, column])
+        topic = self.topics[1]
+        stamps = topic.stamps_ns[which(topic.values[:, column])]
+        place = ((stamps - self.start_ns) * 1e-9 - self.lag_s) * self.sampling_rate_hz
+        reached = np.floor(place).astype(int)[:, None] + np.arange(1 - _REACHED, _REACHED + 1)
+        found = np.zeros(len(self), bool)
+        found[reached[(reached >= 0) & (reached < len(self))]] = True
+        return found
 
     @functools.cached_property
     def rates_std_ppm(self):

@@ -156,7 +156,7 @@ class Topic:
                 count = int(np.sum(self.values[:, column] == limit))
                 words.append(f"{count} samples lie exactly at the {side} limit {limit:.6g}")
         if not own_instants:
-            jitter, step, lower, upper = 0.0, None, None, None
+            jitter, step = 0.0, None
         return Integrity(len(self), self.missing if own_instants else 0, self.duplicates,
                          self.stamps_back, self.not_finite, jitter, step, lower, upper, words)
 

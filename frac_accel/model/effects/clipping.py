@@ -52,31 +52,21 @@ class Clipping(Effect):
 
         None where the values bend before they come to a limit: nothing is cut off then.
         """
-        if self._bends(seen):
+        measured, output, used = seen.as_recorded()
+        error, at_limit = measured - output, self.spoiled(measured)
+        if self._bends(measured, error, used & ~at_limit):
             return None
         resolution = (seen.found.step or 0.0) / np.sqrt(12)
         return Reading({"lower": resolution, "upper": resolution},
-                       (seen.measured - seen.output)[seen.rows],
-                       (seen.measured - self.simulate(seen.output, None))[seen.rows],
+                       error, measured - self.simulate(output, None),
                        "; ".join(words for words in seen.found.words if "limit" in words),
-                       evident=self._goes_beyond(seen))
+                       evident=_goes_beyond(measured, error, at_limit, used))
 
-    def _goes_beyond(self, seen):
-        """Whether the motion goes on far beyond where the values stand."""
-        at = seen.rows & self.spoiled(seen.measured)
-        error = seen.measured - seen.output
-        beyond = at & (error * np.sign(seen.measured) < 0)
-        return bool(beyond.sum() >= _BEYOND * at.sum()
-                    and np.std(error[seen.used]) * _FAR < np.sqrt(np.mean(error[at]**2)))
-
-    def _bends(self, seen):
-        free = seen.used & ~self.spoiled(seen.measured)
-        near = free & ((seen.measured <= _NEAR * self.lower)
-                       | (seen.measured >= _NEAR * self.upper))
+    def _bends(self, measured, error, free):
+        near = free & ((measured <= _NEAR * self.lower) | (measured >= _NEAR * self.upper))
         away = free & ~near
         if near.sum() < _TELL or away.sum() < _TELL:
             return False
-        error = seen.measured - seen.output
         return np.std(error[near]) > _LARGER * np.std(error[away])
 
     def simulate(self, values, circumstances):
@@ -84,3 +74,12 @@ class Clipping(Effect):
 
     def limits(self):
         return self.lower, self.upper
+
+
+def _goes_beyond(measured, error, at_limit, used):
+    """Whether the motion goes on far beyond where the values stand."""
+    if not at_limit.any():
+        return False
+    beyond = error[at_limit] * np.sign(measured[at_limit]) < 0
+    return bool(beyond.mean() >= _BEYOND and np.sqrt(np.mean(error[at_limit]**2))
+                > _FAR * np.std(error[used]))

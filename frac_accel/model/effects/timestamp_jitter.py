@@ -29,7 +29,7 @@ class TimestampJitter(Effect):
         words = next((words for words in seen.found.words if "scatter" in words), None)
         if words is None:
             return None
-        slot, values = seen.at_stamps()
+        _, slot, values = seen.at_stamps()
         inside = seen.used[slot]
         slot, values = slot[inside], values[inside]
         return Reading({"rms_s": self.rms_s / np.sqrt(2 * seen.found.samples)},
