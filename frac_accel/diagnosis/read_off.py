@@ -36,7 +36,7 @@ class Seen:
     is_coarse : bool
         Whether the values' lattice accounts for much of what is left.
     parts : dict of str to float
-        Error budget of what is left: shares by part.
+        Error budget of what is left: shares by part, where they are above zero for certain.
     """
 
     record: object
@@ -132,7 +132,8 @@ def _readings(engine, fitted, found, shown):
     seen = Seen(record, found, p.axis, p.measured[here], fitted.output[here], rows,
                 rows & p.used[here], rows & p.taken(engine.spikes)[here],
                 engine.coarse_step(fitted) is not None,
-                {entry["part"]: entry["share"] for entry in engine.budget(fitted).parts})
+                {entry["part"]: entry["share"] for entry in engine.budget(fitted).parts
+                 if entry["ci95"][0] > 0})
     for cause, cls in known_effects().items():
         recognised = cls.recognised(seen, shown.get(cause)) if cls.read_off else None
         if recognised is not None:
