@@ -42,7 +42,27 @@ class Diagnoser(FracAccelNode):
             "corrector_parameter", "model_file", "its parameter: SENSOR.model_file of one of many")
         self._type = self.declare("message_type", cdr.IMU, "type of both topics")
         depth = self.declare("depth", 2000, "queue of each topic", minimum=1, maximum=10**6)
-        wishes = {
+        wishes = self._declared_wishes()
+        if not model_file:
+            raise NodeError("parameter 'model_file' is missing: -p model_file:=SENSOR.yaml")
+        if axis not in tuple(AXES):
+            raise NodeError(f"parameter 'axis' must be x, y or z, got {axis!r}")
+        if apply not in APPLY:
+            raise NodeError(f"parameter 'apply' must be {' or '.join(APPLY)}, got {apply!r}")
+        self._keeper = Keeper(model_file, results, axis, apply, self._give, **wishes)
+        core = SensorModel.load(model_file).axis(axis).core
+        self._observer = Observer(getattr(core, "sensitivity", 1.0))
+        self._alone, self._alone_from_s, self._observations = [], time.monotonic(), []
+        self._reference_s = None
+        self._connect(depth, wishes["mutual"])
+        self.latency_budget_s = 0.05
+        self._next_s = time.monotonic() + _PERIOD_S
+        self.turns.append(self._take_turn)
+        self.get_logger().info(f"watches axis {axis} with {model_file}; results go to {results}")
+
+    def _declared_wishes(self):
+        """What `Keeper` is told besides, by its names."""
+        return {
             "limit_mb": self.declare(
                 "results_limit_mb", 500.0, "size of the folder: the oldest results go first",
                 minimum=10.0, maximum=1e6),
@@ -64,20 +84,12 @@ class Diagnoser(FracAccelNode):
             "mutual": self.declare(
                 "mutual", False, "whether the reference is no better than the sensor: who has "
                                  "changed is said once imu/third agrees with one of them")}
-        if not model_file:
-            raise NodeError("parameter 'model_file' is missing: -p model_file:=SENSOR.yaml")
-        if axis not in tuple(AXES):
-            raise NodeError(f"parameter 'axis' must be x, y or z, got {axis!r}")
-        if apply not in APPLY:
-            raise NodeError(f"parameter 'apply' must be {' or '.join(APPLY)}, got {apply!r}")
-        self._keeper = Keeper(model_file, results, axis, apply, self._give, **wishes)
-        core = SensorModel.load(model_file).axis(axis).core
-        self._observer = Observer(getattr(core, "sensitivity", 1.0))
-        self._alone, self._alone_from_s, self._observations = [], time.monotonic(), []
-        self._reference_s = None
+
+    def _connect(self, depth, has_third):
+        """Topics and services."""
         message_class = import_message_class(self._type)
         topics = {"imu/reference": self._on_reference, "imu/data_raw": self._on_raw,
-                  **({"imu/third": self._on_third} if wishes["mutual"] else {})}
+                  **({"imu/third": self._on_third} if has_third else {})}
         self._subscriptions_ = [
             RawSubscription(self, message_class, topic, take, raw_qos(depth), is_direct=True)
             for topic, take in topics.items()]
@@ -88,10 +100,6 @@ class Diagnoser(FracAccelNode):
                           ("apply", self._keeper.apply_now),
                           ("roll_back", self._keeper.roll_back)):
             self.create_service(Trigger, f"~/{name}", _answering(act))
-        self.latency_budget_s = 0.05
-        self._next_s = time.monotonic() + _PERIOD_S
-        self.turns.append(self._take_turn)
-        self.get_logger().info(f"watches axis {axis} with {model_file}; results go to {results}")
 
     def finish(self):
         """End what is running."""

@@ -12,6 +12,7 @@ import os
 import struct
 import zlib
 from array import array
+from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
@@ -140,35 +141,11 @@ class McapFile:
             self.warnings.append(warning)
 
     def _scan(self, descriptor: int) -> None:
-        size = self.size
-        head = os.pread(descriptor, 16, 0)
-        if size == 0:
-            raise BagError(f"{self.path}: file is empty")
-        if not head.startswith(MAGIC):
-            for magic, meaning in _FOREIGN_MAGIC.items():
-                if head.startswith(magic):
-                    raise BagError(f"{self.path}: {meaning}")
-            raise BagError(f"{self.path}: not an MCAP file (wrong magic), nor of a format that "
-                           "frac_accel convert reads (db3, csv, parquet, mf4, npz)")
+        self._require_magic(os.pread(descriptor, 16, 0))
         loose = _LooseRun(self)
-        position, in_summary, has_header = len(MAGIC), False, False
-        while True:
-            start = position + _RECORD.size
-            head = os.pread(descriptor, _RECORD.size + 48, position)
-            if len(head) < _RECORD.size:
-                self.damage(f"is cut off at byte {size} (no footer); read up to there")
-                break
-            opcode, length = _RECORD.unpack_from(head)
-            if opcode == 0 or length > size - start:
-                self.damage(
-                    f"record at byte {position} is cut off or damaged; "
-                    f"read up to there, {size - position} bytes are lost"
-                )
-                break
-            content = head[_RECORD.size : _RECORD.size + length]
-            position = start + length
-            if opcode == Opcode.FOOTER:
-                break
+        in_summary, has_header = False, False
+        for opcode, start, length, content in self._records(descriptor):
+            begin, end = start - _RECORD.size, start + length
             if not has_header:
                 has_header = True
                 if opcode == Opcode.HEADER:
@@ -179,7 +156,7 @@ class McapFile:
                 kind = Schema if opcode == Opcode.SCHEMA else Channel
                 self._register(self._description(descriptor, kind, start, length), length)
                 if not in_summary:
-                    loose.add(position - _RECORD.size - length, position, None)
+                    loose.add(begin, end, None)
             elif opcode == Opcode.DATA_END:
                 in_summary = True
             elif opcode == Opcode.STATISTICS:
@@ -189,17 +166,49 @@ class McapFile:
                 loose.close()
                 self._add_chunk(content, start, length)
             elif opcode == Opcode.MESSAGE and not in_summary and length >= 22:
-                log_time = struct.unpack_from("<Q", content, 6)[0]
-                loose.add(position - _RECORD.size - length, position, log_time)
+                loose.add(begin, end, struct.unpack_from("<Q", content, 6)[0])
         loose.close()
         total = sum(segment.body_size for segment in self.segments)
-        if total > allowed_bytes(size, _MAX_TIME, _UNSUSPECTED_TOTAL):
+        if total > allowed_bytes(self.size, _MAX_TIME, _UNSUSPECTED_TOTAL):
             raise BagError(
                 f"{self.path}: declares {total} bytes, more than {_LARGEST_RATIO} times its "
-                f"{size} bytes on disk: not a recording, or one of nothing"
+                f"{self.size} bytes on disk: not a recording, or one of nothing"
             )
         if self.damaged:
             self.counts = None
+
+    def _require_magic(self, head: bytes) -> None:
+        if self.size == 0:
+            raise BagError(f"{self.path}: file is empty")
+        if head.startswith(MAGIC):
+            return
+        for magic, meaning in _FOREIGN_MAGIC.items():
+            if head.startswith(magic):
+                raise BagError(f"{self.path}: {meaning}")
+        raise BagError(f"{self.path}: not an MCAP file (wrong magic), nor of a format that "
+                       "frac_accel convert reads (db3, csv, parquet, mf4, npz)")
+
+    def _records(self, descriptor: int) -> Iterator[tuple[int, int, int, bytes]]:
+        """Opcode, start and length of the content, and its first bytes, of each record up to the
+        footer, or to where the file is damaged."""
+        position = len(MAGIC)
+        while True:
+            start = position + _RECORD.size
+            head = os.pread(descriptor, _RECORD.size + 48, position)
+            if len(head) < _RECORD.size:
+                self.damage(f"is cut off at byte {self.size} (no footer); read up to there")
+                return
+            opcode, length = _RECORD.unpack_from(head)
+            if opcode == 0 or length > self.size - start:
+                self.damage(
+                    f"record at byte {position} is cut off or damaged; "
+                    f"read up to there, {self.size - position} bytes are lost"
+                )
+                return
+            if opcode == Opcode.FOOTER:
+                return
+            yield opcode, start, length, head[_RECORD.size : _RECORD.size + length]
+            position = start + length
 
     def _check_profile(self, header: Header | None) -> None:
         profile = header.profile if header else ""
