@@ -40,10 +40,10 @@ def reason_of(verdict, nrmse, noise, accounted, strange):
              "second_sensor": "down to the noise that a second sensor does not share"}
     to = shown[noise.by] if noise.rms is not None and nrmse > _LITTLE and accounted \
         else f"up to {nrmse:.2%} of the output"
-    left = ""
+    left = f"; {nrmse:.2%} of the output is left"
     if strange:
         parts = ", ".join(f"{share:.0%} {part} ({WORDS[part]})" for share, part in strange[:2])
-        left = f"; of what is left: {parts}"
+        left += f", of which {parts}"
     return {"consistent": f"the model explains the record {to}",
             "explained": f"the named causes explain the record {to}",
             "partly_explained": "the named causes leave a part unexplained" + left,

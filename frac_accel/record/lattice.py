@@ -9,6 +9,9 @@ _DISTINCT = 0.5
 # value may be.
 _ROUNDING = 1e-9
 _OFF = 1e-3
+# Neighbouring blocks of values, each of both states of a bit, that must be visited for a bit that
+# never changes to be stuck.
+_BLOCKS = 4
 
 
 def lattice_step(values):
@@ -30,3 +33,27 @@ def lattice_step(values):
         step = float(np.sum(gaps) / np.sum(counts))
     places = (levels - levels[0]) / step
     return step if np.max(np.abs(places - np.round(places))) < _OFF else None
+
+
+def stuck_bit(values, step):
+    """What the bit is worth that no value changes although values pass it time and again, or None.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    step : float or None
+        That of their lattice.
+    """
+    levels = np.unique(values[:_SAMPLES]) / step if step else np.empty(0)
+    counts = np.round(levels).astype(np.int64)
+    if not len(counts) or np.max(np.abs(levels - counts)) > 0.1:
+        return None
+    bit = 1
+    while np.ptp(counts) > 2 * _BLOCKS * bit:
+        is_set = counts & bit != 0
+        blocks = np.unique(counts // (2 * bit))
+        if (is_set.all() or not is_set.any()) and np.any(
+                blocks[_BLOCKS - 1:] - blocks[:-_BLOCKS + 1] == _BLOCKS - 1):
+            return float(bit * step)
+        bit *= 2
+    return None

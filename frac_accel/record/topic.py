@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import FracAccelError
 from .clipping import certain, pile_up
 from .clock import Clock, require_span, usable
-from .lattice import lattice_step
+from .lattice import lattice_step, stuck_bit
 
 # Samples that make a topic.
 _FEWEST = 32
@@ -151,6 +151,10 @@ class Topic:
         words = self._stamp_words(jitter)
         if step:
             words.append(f"the values are multiples of {step:.6g}")
+        stuck = self._once("bit", column, lambda: stuck_bit(self.values[:, column], step))
+        if stuck:
+            words.append(f"a bit is stuck: the one that is worth {stuck:.6g} is the same in all "
+                         "values")
         for limit, side in ((lower, "lower"), (upper, "upper")):
             if limit is not None:
                 count = int(np.sum(self.values[:, column] == limit))
