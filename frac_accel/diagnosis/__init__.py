@@ -129,11 +129,8 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     # the common lag of the stamps is a median of scattered ones
     loose = _left_open(model.axis(axis), stds, 1.25 * found.jitter_rms_s / np.sqrt(found.samples))
     begin = functools.partial(
-        Engine, record.comparable(column, used), column, model, base={
-            **{cause: entry.effect for cause, entry in loose.items()},
-            **{cause: effect for cause, effect in shown.items() if effect.of_reference}},
-        candidates=[cause for cause, effect in known_effects().items()
-                    if not effect.read_off and effect.acts_on(model.axis(axis).core)],
+        Engine, record.comparable(column, used), column, model,
+        base=_in_every_fit(loose, shown), candidates=_candidates(model.axis(axis).core),
         stages=stages, step=found.step, limit=limit,
         passed_on=None if noise and noise.bends else noise, loose=loose,
         in_own_core=[cause for cause, entry in loose.items()
@@ -148,12 +145,24 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     _require_relation(engine, axis, seed)
     best = engine.run(seed)
     if engine.part is None:
-        engine, best = _without_drowned(begin, engine, best, found, shown, seed)
+        engine, best = _without_drowned(begin, engine, best, found, seed)
     stages.enter("judging what was found", JUDGED)
     judged = judge(engine, best, found, shown, noise_std)
     if orientation:
         judged = with_turn(judged, engine, orientation)
     return dataclasses.replace(judged, screened=screened(engine)) if screening else judged
+
+
+def _in_every_fit(loose, shown):
+    """Effects by cause: what the model in use leaves open, and faults of the reference."""
+    return {**{cause: entry.effect for cause, entry in loose.items()},
+            **{cause: effect for cause, effect in shown.items() if effect.of_reference}}
+
+
+def _candidates(core):
+    """Causes that are fitted, of those that a sensor with a core can have."""
+    return [cause for cause, effect in known_effects().items()
+            if not effect.read_off and effect.acts_on(core)]
 
 
 def _in_axes_of_reference(record, source, axis, temperature, model):
@@ -209,10 +218,10 @@ def _without_spikes(engine, used, stray, reference):
     return (engine(used=used & ~more) if more.any() else first), stray | more
 
 
-def _without_drowned(begin, engine, best, found, shown, seed):
+def _without_drowned(begin, engine, best, found, seed):
     """Engine whose fits leave out the samples in which what the record shows by itself drowns all
     else, and its best set; those given where there are none."""
-    hidden = drowned(engine, best, found, shown)
+    hidden = drowned(engine, best, found)
     if not hidden.any():
         return engine, best
     other = begin(used=engine.wanted & ~hidden)

@@ -354,11 +354,14 @@ def _on_both_sides(engine, best):
     """Filters of the sensor and of the reference that undo each other at an end of the band, or
     where the motion ends."""
     p, found = engine.problem, {}
+    links = {cause: effect for cause, effect in _filters(engine, best).items()
+             if is_link(effect) and _is_smooth(effect)}
+    if len({effect.of_reference for effect in links.values()}) < 2:
+        return {}
     fading = np.linspace(_highest_hz(engine, best), _highest_seen_hz(engine, best), _FADING)
     ends = 2j * np.pi * np.array([0.01 / p.time[-1], *fading, 10 * p.rate])
     filters = [(cause, effect, np.log(np.abs(effect.transfer_function(ends))))
-               for cause, effect in _filters(engine, best).items()
-               if is_link(effect) and _is_smooth(effect)]
+               for cause, effect in links.items()]
     for cause, effect, size in filters:
         for other, reference, back in filters:
             if reference.of_reference and not effect.of_reference and np.any(

@@ -385,19 +385,16 @@ class Engine:
             return 0.0
         return (self.by_reference(fitted) / max(self.rms(fitted.residual), 1e-300))**2
 
-    def budget_beside_limits(self, fitted):
-        """`budget` without the samples at a limit: of a model that has it."""
-        return self._budget_of(fitted, self.at_limit) if self.at_limit.any() \
-            else self.budget(fitted)
+    def budget(self, fitted, hidden=None):
+        """`Budget` of what a fit leaves, of all samples that are there but those of a mask."""
+        if hidden is None or not hidden.any():
+            return _once(self._budgets, fitted,
+                         lambda fitted: self._budget_of(fitted, self.problem.record.valid))
+        return self._budget_of(fitted, self.problem.record.valid & ~self.problem.taken(hidden))
 
-    def budget(self, fitted):
-        """`Budget` of what a fit leaves, of all samples that are there."""
-        return _once(self._budgets, fitted,
-                     lambda fitted: self._budget_of(fitted, np.zeros(len(self.record), bool)))
-
-    def _budget_of(self, fitted, hidden):
+    def _budget_of(self, fitted, rows):
         p = self.problem
-        residual = np.where(p.record.valid & ~p.taken(hidden), p.measured - fitted.output, 0.0)
+        residual = np.where(rows, p.measured - fitted.output, 0.0)
         residual[:p.edge] = residual[len(residual) - p.edge:] = 0.0
         division = self._division
         return division.of(*(values[self._parted] for values in
@@ -412,8 +409,7 @@ class Engine:
         return _once(self._structures, fitted, self._structure_of)
 
     def _structure_of(self, fitted):
-        budget = self._budget_of(fitted, self.silent) if self.silent.any() else self.budget(fitted)
-        parts, step = budget.parts, self.coarse_step(fitted)
+        parts, step = self.budget(fitted, self.silent).parts, self.coarse_step(fitted)
         rounded = {}
         if step:
             p = self.problem

@@ -265,6 +265,8 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
     model = _extended(engine, {**fitted.effects, **named, **{e.cause: e for e in described}},
                       _stated(engine.problem, fitted, after / account.spread))
     p, spread = engine.problem, account.spread
+    # a model that has the limits leaves nothing there
+    at_limit = engine.at_limit if any(f.effect.read_off for f in findings) else None
     if p.in_own_core:
         model, findings = in_own_core(model, findings, p.in_own_core, AXES[p.axis])
     return Diagnosis(
@@ -279,8 +281,7 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
         Evidence.of(engine, best, fitted, named),
         noise.as_dict(), p.limit.summary(),
         [*engine.budget(engine.search.baseline).as_list("baseline"),
-         *(engine.budget_beside_limits if any(f.effect.read_off for f in findings)
-           else engine.budget)(fitted).as_list("extended")])
+         *engine.budget(fitted, at_limit).as_list("extended")])
 
 
 def _stated(problem, fitted, nrmse):

@@ -114,11 +114,11 @@ def read_off(engine, fitted, found, shown):
     return findings
 
 
-def drowned(engine, fitted, found, shown):
-    """Mask, shape (n,), of the samples in which something that the record shows by itself drowns
+def drowned(engine, fitted, found):
+    """Mask, shape (n,), of the samples in which something that the residual shows by itself drowns
     whatever else may be wrong; arguments as those of `read_off`."""
     masks = [reading.drowned for _, _, reading in
-             _readings(engine, fitted, found, shown) if reading.drowned is not None]
+             _readings(engine, fitted, found, {}) if reading.drowned is not None]
     return np.any(masks, axis=0) if masks else np.zeros(len(engine.problem.record), bool)
 
 

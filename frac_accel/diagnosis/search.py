@@ -108,12 +108,17 @@ class Search:
         return self.fits[frozenset(effects)]
 
     def fit_from(self, effects):
-        """Fit a set, anew where what is known of it is worse than these effects are: that had ended
-        in another valley. What is without bound is left."""
-        known = self.fits.get(frozenset(effects))
-        if known is not None and self.problem.cost(effects) < known.cost:
-            del self.fits[known.causes]
+        """Fit a set, anew where what is known of it is worse than these effects are. What is
+        without bound is left."""
+        self._forget_worse(effects)
         self.fit_all([effects])
+
+    def _forget_worse(self, effects, goal=-np.inf):
+        """Forget a fit above a goal (a cost) that is worse than these effects are: it had ended in
+        another valley."""
+        known = self.fits.get(frozenset(effects))
+        if known is not None and known.cost > goal and self.problem.cost(effects) < known.cost:
+            del self.fits[known.causes]
 
     def _keep(self, fit):
         self.fits.pop(fit.causes, None)
@@ -385,10 +390,7 @@ class Search:
     def without(self, fitted, cause, goal=np.inf):
         """The same set without one cause, fitted anew; not to the end if no pace to a goal."""
         less = {name: effect for name, effect in fitted.effects.items() if name != cause}
-        known = self.fits.get(frozenset(less))
-        if known is not None and known.cost > goal and self.problem.cost(less) < known.cost:
-            # that fit had ended in another valley
-            del self.fits[known.causes]
+        self._forget_worse(less, goal)
         found = next(iter(self.fit_all([less], fitted.cost, goal)), None)
         found = found or self.fit(less)
         if goal < found.cost and fitted.effects[cause].pure_delay_s() \

@@ -165,7 +165,7 @@ def follow_laws(functions, count, constants, states, after, q0, v0, q1, v1, dura
 
 @inlined
 def slip(free, sums, length, n0, q0, v0, z0, nm, ne, friction, terms, parameters, functions,
-          count, constants, states):
+         count, constants, states):
     """Force in the middle and at the end of a step without a turn, and the hysteresis there.
 
     free (2, 3): q, q', q'' in the middle and at the end without a force in this step; n0, q0, v0,

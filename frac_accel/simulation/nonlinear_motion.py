@@ -143,7 +143,7 @@ def _integrate(poles, residues, of_displacement, pairs, terms, parameters, funct
         nextm, nexte = beyond(n0, nm, ne)
         n0 = ne
         nm, ne, z = slip(free, sums, step, n0, q0, v0, z, nextm, nexte, 0.0, terms, parameters,
-                          functions, count, constants, states)
+                         functions, count, constants, states)
         if count:
             states[0] = states[2]
         q0 = derivative(free, sums, 1, 0, n0, nm, ne)
