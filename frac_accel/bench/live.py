@@ -142,8 +142,9 @@ def node_and_sink(command, rate_hz):
     ------
     node : subprocess.Popen
     start_publisher : callable
-        Starts a publisher of so many samples from a number on; returns its process and the file
-        that will hold the instants [ns] of sending.
+        Starts a publisher of so many samples from a number on, not before an instant [s] of the
+        monotonic clock; returns its process and the file that will hold the instants [ns] of
+        sending.
     stop_sink : callable
         Stamps and instants [ns] of arrival of all that came, and the last values of its
         diagnostics, dict of str to str.
@@ -160,12 +161,13 @@ def node_and_sink(command, rate_hz):
         past = contextlib.ExitStack()
         stack.enter_context(past)
 
-        def start_publisher(first, count):
+        def start_publisher(first, count, not_before):
             past.close()
             source = past.enter_context(_traffic(
                 environment, "publish", sent_file, "--rate", str(rate_hz), "--count", str(count),
                 "--first", str(first)))
             _await(source, command)
+            time.sleep(max(0.0, not_before - time.monotonic()))
             _tell(source)
             return source, sent_file
 

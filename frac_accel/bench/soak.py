@@ -20,6 +20,8 @@ _MOST_GROWTH_MB = 5.0
 
 # Time [s] by the stamps that a publisher is away for: some of it is bridged, some is not.
 _AWAY_S = (1e-3, 1.0)
+# The rest of the time between two publishers, the second one's process starts.
+_SENDING = 0.6
 # What a message may have come to by the diagnostics' counters, and a sample.
 _FATES = ("samples", "malformed", "lost", "other_publisher", "without_filter")
 _TOLD = ("given", "warm_up", "cut_off", "waiting", "gaps", "filled", "restarts", "late")
@@ -31,7 +33,7 @@ def main(arguments=None):
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--rate", type=float, default=5000.0, metavar="HZ")
     parser.add_argument("--restart", type=float, metavar="S",
-                        help="end the publisher after so long, and start another one")
+                        help="a new publisher every so many seconds")
     parser.add_argument("--picture", default="soak.png", metavar="FILE")
     parser.add_argument("--json", metavar="FILE")
     chosen = parser.parse_args(arguments)
@@ -72,19 +74,20 @@ def _with_restarts(command, chosen, design, watch):
     random time within `_AWAY_S`.
     """
     random = np.random.default_rng(0)
-    count, first, publishers, sent_at = int(chosen.restart * chosen.rate), 0, 0, []
+    count, first, sent_at = int(_SENDING * chosen.restart * chosen.rate), 0, []
+    begun = [-np.inf]
     with live.node_and_sink(command, chosen.rate) as (node, start_publisher, stop_sink):
         cpu_s = machine.cpu_time_s(node.pid)
         end = time.monotonic() + 60 * chosen.minutes
         while time.monotonic() < end:
-            source, sent_file = start_publisher(first, count)
+            source, sent_file = start_publisher(first, count, begun[-1] + chosen.restart)
+            begun.append(time.monotonic())
             while source.poll() is None:
                 time.sleep(1.0)
                 watch(machine.memory_mb(node.pid))
             instants = np.load(sent_file)
             sent_at.append(np.stack([np.arange(first, first + count), instants]))
             first += count + int(chosen.rate * np.exp(random.uniform(*np.log(_AWAY_S))))
-            publishers += 1
         cpu_s = machine.cpu_time_s(node.pid) - cpu_s
         stamps, arrivals, counters = stop_sink()
     numbers, instants = np.concatenate(sent_at, axis=1)
@@ -96,7 +99,9 @@ def _with_restarts(command, chosen, design, watch):
     counted = {name: int(counters[name]) for name in (*_FATES, *_TOLD)}
     uncounted = len(numbers) - sum(counted[name] for name in _FATES)
     undelivered = int(counters["published"]) - len(stamps)
-    return {"publishers": publishers, "sent": len(numbers),
+    every = np.diff(begun[1:])
+    return {"publishers": len(sent_at), "restart_median_s": float(np.median(every)),
+            "restart_max_s": float(every.max()), "sent": len(numbers),
             "uncounted": uncounted,
             "undelivered": undelivered, **counted,
             "cpu_us_per_message": 1e6 * cpu_s / len(numbers)}, (

@@ -109,3 +109,19 @@ def test_no_node_asks_for_more_than_its_profile_has(tmp_path):
         assert not {entry for entry in entries if not any(
             re.fullmatch(rule.replace("*", ".*"), entry) for rule in may)}, (name, kind, way)
         assert entries or way in ("subscribe", "request"), (name, kind, way)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("keys", ["missing", "empty enclave"])
+def test_a_node_without_its_keys_ends_and_does_not_run_unsecured(tmp_path, keys):
+    pytest.importorskip("rclpy")
+    from ros_processes import NodeProcess, ros_domain
+    if keys == "empty enclave":
+        (tmp_path / "enclaves" / "frac_accel" / "corrector").mkdir(parents=True)
+    with ros_domain() as environment:
+        secured = {**environment, "ROS_SECURITY_KEYSTORE": str(tmp_path),
+                   "ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}
+        with NodeProcess("corrector", secured, {}, "--enclave", "/frac_accel/corrector") as node:
+            assert node.wait() == 2
+    told = [line for line in node.errors if line.startswith("corrector: error: ")]
+    assert len(told) == 1 and "secur" in told[0].lower() and "Traceback" not in node.text
