@@ -98,7 +98,7 @@ else
 	    "monitoring_bench drives" "monitoring_bench healthy"; do PYTHONPATH=test:. $(python) -m $$part || exit; done
 endif
 
-# MINUTES=2 for a shorter one; SOAK="--rate 2000 --restart 8" with publishers that come and go.
+# MINUTES=2 for a shorter one; SOAK="--rate 2000 --restart 10" with publishers that come and go.
 soak: setup
 	$(python) -m frac_accel.bench.soak --minutes $(or $(MINUTES),10) --picture soak.png $(SOAK)
 

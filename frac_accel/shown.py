@@ -1,4 +1,4 @@
-"""How results show themselves in a notebook."""
+"""How results show themselves: figures, and numbers with their nouns."""
 
 from __future__ import annotations
 
@@ -26,6 +26,14 @@ class Shown:
         self.plot().savefig(image, format="png", dpi=90)
         data = base64.b64encode(image.getvalue()).decode()
         return f'<p>{html.escape(repr(self))}</p><img src="data:image/png;base64,{data}">'
+
+
+def several(count: int, one: str, more: str | None = None) -> str:
+    """A number with its noun, and its verb if given: ``1 gap was``, ``2 gaps were``.
+
+    Without `more` the plural is the noun with an s.
+    """
+    return f"{count} {one}" if count == 1 else f"{count} {more or one + 's'}"
 
 
 def above(axes: Any) -> None:

@@ -19,6 +19,7 @@ from ..model.effects import known_effects
 from ..record import Record
 from ..record.orientation import Orientation, turned_away
 from ..record.sources import pair_of
+from ..shown import several
 from ..simulation import AxisSimulator
 from .engine import Engine
 from .finding import Diagnosis, Finding, insufficient
@@ -137,8 +138,9 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
                      if seed is not None and entry.effect.restates_core])
     engine, stray = _without_spikes(begin, used, stray, record.reference[:, column])
     if stray.any():
-        found.words.append(f"{stray.sum()} samples stand far out, alone, while the reference does "
-                           "not: spikes, which count in no fit")
+        found.words.append(several(stray.sum(), "sample stands", "samples stand")
+                           + " far out, alone, while the reference does not: spikes, which count "
+                           "in no fit")
     engine.spikes, engine.aside = stray, stray | (record.valid & ~moving)
     engine.at_limit = at_limit
     engine.identified = {cause: effect for cause, effect in (seed or {}).items() if effect.everyday}

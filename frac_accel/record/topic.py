@@ -6,6 +6,7 @@ import functools
 import numpy as np
 
 from ..errors import FracAccelError
+from ..shown import several
 from .clipping import certain, pile_up
 from .clock import Clock, require_span, usable
 from .lattice import lattice_step, stuck_bit
@@ -158,7 +159,8 @@ class Topic:
         for limit, side in ((lower, "lower"), (upper, "upper")):
             if limit is not None:
                 count = int(np.sum(self.values[:, column] == limit))
-                words.append(f"{count} samples lie exactly at the {side} limit {limit:.6g}")
+                words.append(several(count, "sample lies", "samples lie")
+                             + f" exactly at the {side} limit {limit:.6g}")
         if not own_instants:
             jitter, step = 0.0, None
         return Integrity(len(self), self.missing if own_instants else 0, self.duplicates,
@@ -168,13 +170,13 @@ class Topic:
         words, clock = [], self.clock
         if self.missing:
             total = len(self) + self.missing
-            words.append(f"{self.missing} of {total} samples are missing "
-                         f"({self.missing / total:.2%})")
-        for number, what in ((self.duplicates, "repeat a stamp"),
-                             (self.stamps_back, "have a stamp that goes back"),
-                             (self.not_finite, "are not finite")):
+            words.append(several(self.missing, f"of {total} samples is", f"of {total} samples are")
+                         + f" missing ({self.missing / total:.2%})")
+        for number, what in ((self.duplicates, "with a stamp that was there before"),
+                             (self.stamps_back, "with a stamp that goes back"),
+                             (self.not_finite, "with values that are not finite")):
             if number:
-                words.append(f"{number} samples {what} and are left out")
+                words.append(f"left out: {several(number, 'sample')} {what}")
         if clock.kind == "uneven":
             steps = np.percentile(np.diff(self.stamps_ns), [5, 95]) * 1e-9
             words.append(f"the stamps are uneven: 90 % of the steps last {steps[0]:.3g} to "

@@ -3,6 +3,7 @@
 import dataclasses
 
 from ..model import AXES
+from ..shown import several
 from .live_metrics import Findings
 from .monitors import NOT_CONNECTED
 from .timing import RATE_SAMPLES
@@ -258,23 +259,27 @@ def _troubles(s):
                 for axis, fault in zip(AXES, s.faults) if fault == NOT_CONNECTED]
     for name, text in _DROPPED.items():
         if changes.get(name) and name != "other_publisher":
-            troubles.append(f"{changes[name]} samples {text} and were dropped"
+            troubles.append(f"{several(changes[name], 'sample')} {text} and "
+                            + ("was dropped" if changes[name] == 1 else "were dropped")
                             + (_SHORT_SHOCKS if name == "implausible" and s.learns_range else ""))
     if changes.get("gaps"):
-        troubles.append(f"{changes['gaps']} gaps were bridged over {changes.get('filled', 0)} "
-                        "samples")
+        troubles.append(f"{several(changes['gaps'], 'gap was', 'gaps were')} bridged over "
+                        + several(changes.get("filled", 0), "sample"))
     if changes.get("restarts"):
-        troubles.append(f"the filter started anew {changes['restarts']} times after longer gaps")
+        troubles.append("the filter started anew after longer gaps, "
+                        + several(changes["restarts"], "time"))
     if changes.get("malformed"):
-        troubles.append(f"{changes['malformed']} messages could not be read")
+        troubles.append(several(changes["malformed"], "message") + " could not be read")
     if changes.get("lost"):
-        troubles.append(f"{changes['lost']} messages were lost on the way: raise depth")
+        troubles.append(several(changes["lost"], "message was", "messages were")
+                        + " lost on the way: raise depth")
     if changes.get("unpublished"):
-        troubles.append(f"{changes['unpublished']} corrected messages were not taken by the "
+        troubles.append(several(changes["unpublished"], "corrected message was",
+                                "corrected messages were") + " not taken by the "
                         "middleware: a subscriber that must get all of them is too slow")
     if changes.get("late"):
-        troubles.append(f"{changes['late']} messages waited too long before they were corrected: "
-                        "the machine is too busy")
+        troubles.append(f"{several(changes['late'], 'message')} waited too long before "
+                        "correction: the machine is too busy")
     refused = [f"{p.node} {p.refusal}" for p in s.publishers if p.refusal]
     if refused:
         troubles.append(f"not received from another publisher: {'; '.join(refused)}")
@@ -286,8 +291,8 @@ def _troubles(s):
     if changes.get("without_temperature"):
         troubles.append("no temperature has come, so 25 °C is assumed, with an uncertainty of 35 K")
     if changes.get("clipped"):
-        troubles.append(f"{changes['clipped']} samples are at the limits of the model's range; "
-                        "their variance says so")
+        troubles.append(several(changes["clipped"], "sample is", "samples are")
+                        + " at the limits of the model's range; the variance says so")
     if s.findings.clipped_axes:
         troubles.append(f"axis {', '.join(s.findings.clipped_axes)} seems to be clipped")
     if s.findings.constant:

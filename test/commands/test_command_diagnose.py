@@ -201,7 +201,8 @@ def holed(samples):
 
 def test_values_that_are_not_finite_are_left_out(files, tmp_path):
     said = diagnose(tmp_path, *changed(files, tmp_path, sensor=holed))
-    assert any("300 samples are not finite" in words for words in said["integrity"])
+    assert any("300 samples with values that are not finite" in words
+               for words in said["integrity"])
     # a value that is no number is no message that was lost
     assert [finding["cause"] for finding in said["findings"]] == ["mounting_resonance"]
 

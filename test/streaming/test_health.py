@@ -84,6 +84,7 @@ def test_silence_is_explained(situation, level, words):
     (changed(refused_subscribers=("/logger (DURABILITY)",)), "subscriber that asks for another "
      "quality of service: /logger (DURABILITY)"),
     (changed(changes=GOOD.changes | {"late": 4}), "4 messages waited too long"),
+    (changed(changes=GOOD.changes | {"gaps": 1, "filled": 1}), "1 gap was bridged over 1 sample"),
     (changed(changes=GOOD.changes | {"malformed": 4}), "4 messages could not be read"),
     (changed(stated_rate_hz=1000.0), "sample_rate_hz is 1000, but the stamps advance at 2000 Hz"),
     (changed(findings=Findings(clipped_axes="xz")), "axis x, z seems to be clipped"),
