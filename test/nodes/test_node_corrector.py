@@ -238,7 +238,7 @@ def test_it_says_why_nothing_is_published(record, model_file):
         publish([(publisher, [b"\0\1\0\0" + bytes(20)])])
         publish([(publisher, messages[40:])])
         status = probe.status("60 samples had the same stamp as the one before and were dropped; "
-                              "1 messages could not be read")
+                              "1 message could not be read")
         assert float(values_of(status)["sample_rate_hz"]) == pytest.approx(2000)
         assert node.stop() == 0
         assert "malformed 1" in node.output[-1]
