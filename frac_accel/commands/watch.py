@@ -21,10 +21,12 @@ frac_accel watch front/imu rear/imu
 _BARS = "▁▂▃▄▅▆▇█"
 _COLOURS = ("green", "yellow", "red")
 _PERIOD_S = 0.25
-# Time without a report after which a sensor counts as silent, and widths of sparklines by that of
-# the terminal.
+_TITLE = "frac_accel watch, q quits"
+# Time without a report after which a sensor counts as silent.
 _SILENT_S = 3.5
-_WIDE, _WIDTHS = 130, (8, 20)
+# Columns of a terminal that holds the table, bars of a sparkline in it, and columns for each bar of
+# a narrower terminal.
+_WIDE, _BARS_WIDE, _PER_BAR = 140, 12, 10
 
 
 def add_arguments(parser):
@@ -62,32 +64,61 @@ def _show(watcher, wanted, pressed):
 
 
 def table(sensors, now_s, width=_WIDE):
-    """What is known of some sensors, as a table of rich."""
-    from rich.table import Table
+    """What is known of some sensors for a terminal of that many columns: a table of rich, or where
+    that would not fit two lines for each."""
     from rich.text import Text
     if not sensors:
         return Text("waiting for a corrector: nobody publishes /diagnostics or ~/metrics of one "
                     "in this ROS domain; q quits")
-    drawn = Table(title="frac_accel watch, q quits", title_justify="left", expand=True)
+    return _wide(sensors, now_s, width) if width >= _WIDE else _narrow(sensors, now_s, width)
+
+
+def _wide(sensors, now_s, width):
+    from rich.table import Table
+    drawn = Table(title=_TITLE, title_justify="left", expand=True)
     for heading, right in (("sensor", False), ("raw RMS", True), ("", False),
                            ("corrected RMS", True), ("", False), ("rate [Hz]", True),
                            ("latency 99 %", True), ("verdict", False)):
         drawn.add_column(heading, justify="right" if right else "left",
                          no_wrap=right or not heading, overflow="fold",
                          ratio=2 if heading == "verdict" else None)
-    length = _WIDTHS[width >= _WIDE]
     for sensor in sensors:
-        figures, silent_s = sensor.figures, now_s - sensor.heard_s
-        level, verdict = sensor.level, sensor.verdict or "not yet judged"
-        if silent_s > _SILENT_S:
-            level, verdict = 2, f"its corrector has been silent for {silent_s:.0f} s"
+        figures = sensor.figures
         drawn.add_row(
-            sensor.name, _number(_last(sensor.raw)), sparkline(list(sensor.raw)[-length:]),
-            _number(_last(sensor.corrected)), sparkline(list(sensor.corrected)[-length:]),
-            _number(figures.get("received_per_s", math.nan)),
-            _number(1e3 * figures.get("latency_p99_s", math.nan), " ms"),
-            Text(verdict, style=_COLOURS[min(level, 2)]))
+            sensor.name, _number(_last(sensor.raw)), sparkline(list(sensor.raw)[-_BARS_WIDE:]),
+            _number(_last(sensor.corrected)), sparkline(list(sensor.corrected)[-_BARS_WIDE:]),
+            _number(figures.get("received_per_s", math.nan)), _latency(figures),
+            _verdict(sensor, now_s))
     return drawn
+
+
+def _narrow(sensors, now_s, width):
+    from rich.text import Text
+    drawn = Text(_TITLE, style="bold")
+    for sensor in sensors:
+        drawn.append(f"\n{sensor.name}  ", style="bold")
+        drawn.append_text(_verdict(sensor, now_s))
+        figures, words = sensor.figures, []
+        for name, values in (("raw", sensor.raw), ("corrected", sensor.corrected)):
+            words.append(f"{name} {_number(_last(values))} "
+                         + sparkline(list(values)[-(width // _PER_BAR):]))
+        words.append(f"{_number(figures.get('received_per_s', math.nan))} Hz")
+        words.append(f"latency {_latency(figures)}")
+        drawn.append("\n  " + "  ".join(words), style="not bold")
+    return drawn
+
+
+def _verdict(sensor, now_s):
+    from rich.text import Text
+    level, verdict = sensor.level, sensor.verdict or "not yet judged"
+    silent_s = now_s - sensor.heard_s
+    if silent_s > _SILENT_S:
+        level, verdict = 2, f"its corrector has been silent for {silent_s:.0f} s"
+    return Text(verdict, style=_COLOURS[min(level, 2)])
+
+
+def _latency(figures):
+    return _number(1e3 * figures.get("latency_p99_s", math.nan), " ms")
 
 
 def sparkline(values):
@@ -110,7 +141,9 @@ def _last(values):
 
 
 def _number(value, unit=""):
-    return f"{value:.3g}{unit}" if math.isfinite(value) else "–"
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.0f}{unit}" if 1000 <= abs(value) < 1e6 else f"{value:.3g}{unit}"
 
 
 @contextlib.contextmanager

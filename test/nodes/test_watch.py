@@ -53,7 +53,10 @@ class Terminal:
         self.process = subprocess.Popen(
             [*session, sys.executable, "-m", "frac_accel.cli", "watch", *arguments],
             stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=not session,
-            env={**os.environ, "PYTHONPATH": str(ROOT), "TERM": "xterm-256color", **environment})
+            # what pytest was started in says nothing of this terminal
+            env={**{name: value for name, value in os.environ.items()
+                    if name not in ("COLUMNS", "LINES")},
+                 "PYTHONPATH": str(ROOT), "TERM": "xterm-256color", **environment})
 
     def __enter__(self):
         return self
@@ -138,11 +141,13 @@ def test_a_silent_corrector_and_missing_figures_are_said():
     sensor = Seen("/front/imu/data_raw", 60)
     sensor.verdict, sensor.heard_s = "all is well", 100.0
     sensor.take({"x/raw/std": 3.0, "y/raw/std": 4.0, "received_per_s": 99.6})
-    for now_s, words in ((101.0, "all is well"), (160.0, "silent for 60 s")):
-        console = Console(width=140, record=True, file=open(os.devnull, "w"))
-        console.print(table([sensor], now_s, 140))
-        text = console.export_text()
-        assert words in text and " 5 " in text and "99.6" in text and "–" in text
+    for width in (140, 80, 40):
+        for now_s, words in ((101.0, "all is well"), (160.0, "silent for 60 s")):
+            console = Console(width=width, record=True, file=open(os.devnull, "w"))
+            console.print(table([sensor], now_s, width))
+            text = " ".join(console.export_text().split())
+            assert sensor.name in text and words in text
+            assert " 5 " in text and "99.6" in text and "–" in text
 
 
 @pytest.mark.parametrize("values, bars", [
