@@ -1,4 +1,4 @@
-# make setup | demo | check | test | test-all | lint | types | bench | bench-fleet | soak | blind |
+# make setup | demo | check | test | test-all | test-draws | lint | types | bench | bench-fleet | soak | blind |
 #      fuzz | docs | browser | pins | clean
 # Needs Python 3.10 to 3.13, git and make. PYTHON=python3.12 chooses the Python of .venv.
 
@@ -7,17 +7,17 @@ unexport PYTHONPATH LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 .DELETE_ON_ERROR:
-.PHONY: setup demo docs check test test-numerical test-ros test-all test-others test-oldest lint types bench bench-fleet soak blind fuzz browser pins clean FORCE
+.PHONY: setup demo docs check test test-numerical test-ros test-all test-draws test-oldest lint types bench bench-fleet soak blind fuzz browser pins clean FORCE
 
 venv := .venv
 oldest := .venv-oldest
 docs := .venv-docs
 python := $(venv)/bin/python
 numerical := -m pytest -n 2
-# What no numerical library's age can change: packages, pages in a browser, nodes, and what full
-# disks, signals and damaged files do to the commands.
+# What no numerical library's age can change: packages, pages in a browser, nodes, and what signals
+# do to the commands.
 not_numerical := $(addprefix --ignore=test/,package report nodes fleet/test_local_cores.py \
-    $(addprefix commands/test_,outputs.py write_errors.py fuzz.py command_fleet.py command_line.py))
+    $(addprefix commands/test_,outputs.py command_line.py))
 # What an installer says is kept, and shown only where it fails.
 quietly = > $(venv)/install.log 2>&1 || { cat $(venv)/install.log; exit 1; }
 
@@ -40,7 +40,7 @@ docs: setup $(docs)/.done
 	@echo site/index.html
 
 # BLAS threads would only fight with the other worker.
-check test test-numerical test-ros test-all test-others test-oldest: export OPENBLAS_NUM_THREADS := 1
+check test test-numerical test-ros test-all test-draws test-oldest: export OPENBLAS_NUM_THREADS := 1
 
 # In a minute what catches most.
 check: $(venv)/.frac_accel lint types
@@ -51,29 +51,29 @@ test: setup lint types
 	@$(MAKE) --no-print-directory -j 2 -k test-numerical test-ros
 
 test-numerical:
-	env -u MAKEFLAGS nice -n 10 $(python) $(numerical) -m "not ros and not long"
+	env -u MAKEFLAGS nice -n 10 $(python) $(numerical) -m "not (ros or thorough or long)"
 
 # Told when they are done.
 test-ros:
-	@env -u MAKEFLAGS $(python) -m pytest -m ros > $(venv)/ros.log 2>&1; failed=$$?; \
+	@env -u MAKEFLAGS $(python) -m pytest -n 2 -m ros > $(venv)/ros.log 2>&1; failed=$$?; \
 	    cat $(venv)/ros.log; exit $$failed
 
-# The further draws and the long Monte Carlos (hours), the site, and the rest with the oldest
-# libraries.
-test-all: setup
-	@$(MAKE) --no-print-directory docs
-	$(python) $(numerical) -m "not ros and long"
-	@$(MAKE) --no-print-directory test-others
-
-# What make test runs of numerical tests, once more with the oldest libraries, where a Python has them.
-test-others:
+# What make test leaves out but for the further draws: the site, searches and Monte Carlos that take
+# long, and what make test runs of numerical tests once more with the oldest libraries, where a
+# Python has them.
+test-all: setup docs
+	$(python) $(numerical) -m thorough
 	@if $(find_oldest) >/dev/null; then $(MAKE) --no-print-directory test-oldest; else \
 	    echo "so the numerical suite was not run with numpy 1.26.4 and scipy 1.11.4"; fi
+
+# Hours.
+test-draws: setup
+	$(python) $(numerical) -m "long and not ros"
 
 test-oldest: $(oldest)/.done
 	@$(oldest)/bin/python -c 'import numpy, platform, scipy; print("once more with Python", \
 	    platform.python_version(), "numpy", numpy.__version__, "scipy", scipy.__version__)'
-	$(oldest)/bin/python $(numerical) -m "not ros and not long" $(not_numerical)
+	$(oldest)/bin/python $(numerical) -m "not (ros or thorough or long)" $(not_numerical)
 
 lint: $(venv)/.done
 	$(python) -m ruff check .

@@ -1,4 +1,4 @@
-"""Which tests `make check` and `colcon test` run, and which of many draws `make test` spares."""
+"""Which tests `make check`, `make test`, `make test-all` and `colcon test` run."""
 
 import pytest
 
@@ -13,8 +13,14 @@ SLOW = """
     test_plug_in_of_the_documentation_as_a_third_party_installs_it test_walk_through_of_contributing
     test_the_package_can_be_imported_before_and_after test_random_damage_raises_bag_errors_only
 """.split()
-# Files whose tests draw many records or sensors: `make test` runs the first draw of each test, and
-# `make test-all` the others.
+# Files of searches and Monte Carlos that take most of the time: `make test-all` runs them.
+THOROUGH = """
+    blind_scoring budget command_fleet diagnosis_laws diagnosis_of_measured diagnosis_truthful
+    diagnosis_unbounded domains_agree empirical_link free_mass fuzz linear_causes monitoring_watch
+    paper_command paper_study pooling real_records reference_noise uncertain_motion write_errors
+""".split()
+# Files whose tests draw many records or sensors: the first draw of each test counts as the file
+# does, and `make test-draws` runs the others.
 MANY_DRAWS = """
     axis_monitors backlash budget changes_in_time core_response corrected_uncertainty
     corrector_uncertainty diagnosis_data_checks diagnosis_exchanged diagnosis_laws
@@ -49,14 +55,17 @@ def pytest_ignore_collect(collection_path, config):
 
 
 def pytest_collection_modifyitems(items):
-    """Mark them, but nothing that is long or needs ROS or the real records."""
+    """Mark them; nothing is fast that is long or needs ROS or the real records."""
     seen = set()
     for item in items:
-        if item.path.stem.removeprefix("test_") in MANY_DRAWS:
+        file = item.path.stem.removeprefix("test_")
+        if file in MANY_DRAWS:
             draw = item.path, item.originalname
             if draw in seen:
                 item.add_marker(pytest.mark.long)
             seen.add(draw)
-        if item.path.stem.removeprefix("test_") in FAST and item.originalname not in SLOW \
+        if file in THOROUGH and not any(map(item.get_closest_marker, ("long", "ros"))):
+            item.add_marker(pytest.mark.thorough)
+        if file in FAST and item.originalname not in SLOW \
                 and not any(map(item.get_closest_marker, ("long", "ros", "real_data"))):
             item.add_marker(pytest.mark.fast)
