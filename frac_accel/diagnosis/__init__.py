@@ -11,7 +11,7 @@ from scipy.ndimage import binary_erosion
 from ..budget.reference_noise import reference_noise
 from ..errors import FracAccelError, IdentificationError
 from ..identification.checks.record_checks import moving_samples
-from ..identification.response.excitation import learning_length, require_excitation
+from ..identification.response.excitation import held_out, require_excitation
 from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC
 from ..model import AXES, SensorModel
 from ..model.core import Gain, Oscillator
@@ -250,8 +250,8 @@ def _shown(found, record, column, used):
 def _too_poor(record, column, used, model):
     """Words where a record holds too little to be judged, or, without a model, to identify one."""
     reference = record.reference[:, column]
-    split = learning_length(reference)
-    for rows, part in ((used[:split], "training"), (used[split:], "held-out")):
+    last = held_out(reference)
+    for rows, part in ((used & ~last, "training"), (used & last, "held-out")):
         if rows.sum() < _FEWEST // 4:
             return f"only {rows.sum()} {part} samples; {_FEWEST // 4} needed"
     try:

@@ -55,6 +55,9 @@ _SEVERAL, _NEAR = 3, 4.0
 _AS_WELL = 1.5
 # Standard uncertainties by which a delay below zero is one.
 _ACAUSAL = 3.0
+# Share of the motion's power beyond whose frequencies none is seen, and times the highest of these
+# from which a resonance is out of sight.
+_ALL_MOTION, _OUT_OF_SIGHT = 0.9999, 1.2
 # Sampling intervals below which a lead is none of stamps.
 _NO_LEAD = 0.01
 _MORE = ("a linear filter would take another {:.0%} of what is left: the linear causes only "
@@ -316,11 +319,11 @@ def _other_axes(engine, best, takes, left):
             if best.effects[cause].stage == CROSS_AXIS and taken < _ACROSS * rest}
 
 
-def _highest_hz(engine, best):
+def _highest_hz(engine, best, share=_MOTION):
     """Frequency [Hz] below which nearly all of the motion is that the sensor shows."""
     used = engine.problem.used
     energy = np.cumsum(np.abs(np.fft.rfft((best.output - best.output[used].mean()) * used))**2)
-    return np.searchsorted(energy, _MOTION * energy[-1]) * engine.problem.rate / len(used)
+    return np.searchsorted(energy, share * energy[-1]) * engine.problem.rate / len(used)
 
 
 def _highest_seen_hz(engine, best):
@@ -337,17 +340,28 @@ def _highest_seen_hz(engine, best):
 
 
 def _beyond_the_motion(engine, best):
-    """Links that make fast motion larger and resonate above all of it, beside a late reference."""
-    if not engine.problem.record.is_reference_late:
-        return {}
-    highest = _highest_hz(engine, best)
-    top = np.array([2j * np.pi * highest])
-    return {cause: f"it resonates above the motion, which ends at {highest:.3g} Hz: to a reference "
-                   "that is late and was smoothed, fast motion looks as much too large"
-            for cause, effect in _filters(engine, best).items()
-            if is_link(effect) and not effect.of_reference and len(effect.poles())
-            and abs(effect.transfer_function(top)[0]) > 1
-            and np.abs(effect.poles()).min() > abs(top[0])}
+    """Links of the sensor that resonate above all of the motion, where other filters do the same:
+    those that make fast motion larger beside a late reference, which may have been smoothed, and
+    any beside a core that does so, too, and that nobody has stated."""
+    p, found = engine.problem, {}
+    highest = 2 * np.pi * _highest_hz(engine, best)
+    seen = 2 * np.pi * min(_highest_hz(engine, best, _ALL_MOTION), _highest_seen_hz(engine, best))
+    unknown = any(entry.effect.restates_core and not np.isfinite([*entry.std.values()]).all()
+                  for entry in engine.loose.values())
+    core = np.abs(p.axis_model(best.effects).effective_core.poles()) if unknown else []
+    for cause, effect in _filters(engine, best).items():
+        if not is_link(effect) or effect.of_reference or not len(effect.poles()):
+            continue
+        lowest = np.abs(effect.poles()).min()
+        if p.record.is_reference_late and lowest > highest \
+                and abs(effect.transfer_function(np.array([1j * highest]))[0]) > 1:
+            found[cause] = "it resonates above the motion, which ends at " \
+                           f"{highest / 2 / np.pi:.3g} Hz: to a reference that is late and was " \
+                           "smoothed, fast motion looks as much too large"
+        elif len(core) and min(lowest, np.min(core)) > _OUT_OF_SIGHT * seen:
+            found[cause] = f"it and the core resonate above the motion, which shows up to " \
+                           f"{seen / 2 / np.pi:.3g} Hz: there many filters do the same"
+    return found
 
 
 def _on_both_sides(engine, best):
@@ -459,9 +473,11 @@ def _acausal(engine, best, stds):
     # the reference's delay is a lead of the sensor
     late = {cause: -effect.pure_delay_s() for cause, effect in links.items()
             if effect.of_reference and effect.pure_delay_s() < 0}
-    strange = [cause for cause in own if not best.effects[cause].everyday]
+    lead = max(late.values(), default=0.0)
+    # a digital filter of some samples delays by less than the one of its length in continuous time
+    strange = [cause for cause in own if not best.effects[cause].everyday
+               and not lead < min(best.effects[cause].pure_delay_s(), 1 / p.rate)]
     if late and strange and not p.record.is_reference_late:
-        lead = max(late.values())
         return dict.fromkeys([*late, *strange], f"a lead of {lead:.3g} s, which only a fit beside "
                              "a filter shows: together they imitate something else")
     return {cause: f"a lead of {lead:.3g} s beside a filter, less than a sampling interval: a "

@@ -10,10 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from ..budget import Division, established_noise
 from ..errors import FracAccelError
 from ..identification.fit.uncertainty import by_blocks, sandwich
-from ..identification.response.excitation import (
-    alternating_stretches,
-    learning_length,
-)
+from ..identification.response.excitation import held_out
 from ..model import AxisModel, is_link
 from ..model.effects import effect_of
 from .gain import gain
@@ -33,9 +30,6 @@ WEIGHS = 3.0
 _RIVALS = 4
 # Records of more samples are searched in part first.
 LONG = 40_000
-# A last part with less than this of the motion before it proves little; stretches instead of it.
-_QUIET_END = 0.5
-_STRETCHES = 20
 # Parts of the record in which a cause's strength is compared.
 _PARTS = 5
 # Causes that the whole of a long record may add to those of its part.
@@ -65,6 +59,8 @@ _ALONE = 10.0
 _COARSE = 0.2
 # Frequencies over which a density is integrated.
 _LINES = 2049
+# Error of a simulation, and of values put on other instants, over the output's spread.
+_SIMULATED, _RESAMPLED = 3e-5, 1e-4
 
 
 def noise_peak(residual, used):
@@ -72,19 +68,6 @@ def noise_peak(residual, used):
     power = np.abs(rfft(residual))**2
     smooth = uniform_filter1d(power, max(5, len(power) // 64), mode="reflect")
     return float(max(smooth.max() / smooth.mean(), 1.0))
-
-
-def held_out(reference):
-    """Which samples are held out, as a mask.
-
-    The last ones, from where a share of the reference's energy has come; where these are quiet, as
-    after a shock, every other stretch.
-    """
-    last = np.arange(len(reference)) >= learning_length(reference)
-    moving = reference - reference.mean()
-    if np.std(moving[last]) < _QUIET_END * np.std(moving[~last]):
-        return alternating_stretches(reference, _STRETCHES)
-    return last
 
 
 class Engine:
@@ -117,8 +100,9 @@ class Engine:
         self.at_limit = self.drowned = np.zeros(len(record), bool)
         self.held_out_rows = self.problem.used & held_out(self.problem.record.reference[:, axis])
         self._learnt, self._budgets, self._structures, self._left = {}, {}, {}, {}
-        # what the numerics of the simulation may still be wrong by
-        self.floor = 3e-5 * float(np.std(record.sensor[used, axis]))
+        # what the numerics may still be wrong by: of the simulation, and of other instants
+        self.floor = (_RESAMPLED if record.resampled else _SIMULATED) \
+            * float(np.std(record.sensor[used, axis]))
 
     @property
     def silent(self):
@@ -378,12 +362,12 @@ class Engine:
         gain = np.abs(sensor.transfer_function(2j * np.pi * frequency))
         return float(np.sqrt(np.mean(gain**2 * density) * p.rate / 2))
 
-    def _passed_on(self, fitted):
-        """Share of a residual's power by noise of the reference that the model passes on, so that
-        what is left follows it; none where the reference counts behind a filter of that noise."""
-        if not self.passed_on:
-            return 0.0
-        return (self.by_reference(fitted) / max(self.rms(fitted.residual), 1e-300))**2
+    def _no_fault(self, fitted):
+        """Share of a residual's power that follows the motion and is no fault of the model:
+        numerics, and noise of the reference that the model passes on; none of the latter where the
+        reference counts behind a filter of that noise."""
+        own = self.by_reference(fitted) if self.passed_on else 0.0
+        return (own**2 + self.floor**2) / max(self.rms(fitted.residual), 1e-300)**2
 
     def budget(self, fitted, hidden=None):
         """`Budget` of what a fit leaves, of all samples that are there but those of a mask."""
@@ -417,7 +401,7 @@ class Engine:
             rounded = {entry["part"]: SCATTER * entry["share"] for entry in self._division.of(
                 *(values[self._parted] for values in
                   (error, fitted.output + error, fitted.output))).parts}
-        own = self._passed_on(fitted)
+        own = self._no_fault(fitted)
         shares = [(entry["share"] - rounded.get(entry["part"], 0.0) - own,
                    entry["ci95"][0] - rounded.get(entry["part"], 0.0) - own, entry["part"])
                   for entry in parts if entry["part"] != "noise"]
@@ -621,7 +605,7 @@ class Engine:
                   if axis != p.axis and np.ptp(signal)]
         found = leftover(fitted.residual, fitted.simulated, p.used, across,
                          self.coarse_step(fitted))
-        own = self._passed_on(fitted)
+        own = self._no_fault(fitted)
         return dataclasses.replace(found, linear=max(found.linear - own, 0.0),
                                    level=max(found.level - own, 0.0))
 

@@ -1,6 +1,7 @@
 """The verdict and its words."""
 
 from ..budget import WORDS
+from ..shown import several
 
 # Share of the output's RMS that may be left without noise being established, and factor by which an
 # error may exceed noise that is.
@@ -10,6 +11,8 @@ AS_NOISE = 1.2
 _NOTHING = 0.005
 # Share of the residual's power that may be no noise in a record that counts as explained.
 _MOSTLY_NOISE = 0.3
+# Least share of the output that is given as a number.
+_SHOWN = 1e-4
 # Share of an error by which the reference's own noise is worth a word.
 _HIDDEN = 0.1
 
@@ -39,8 +42,8 @@ def reason_of(verdict, nrmse, noise, accounted, strange):
              "stated": "down to the noise that was stated",
              "second_sensor": "down to the noise that a second sensor does not share"}
     to = shown[noise.by] if noise.rms is not None and nrmse > _LITTLE and accounted \
-        else f"up to {nrmse:.2%} of the output"
-    left = f"; {nrmse:.2%} of the output is left"
+        else f"up to {_percent(nrmse)} of the output"
+    left = f"; {_percent(nrmse)} of the output is left"
     if strange:
         parts = ", ".join(f"{share:.0%} {part} ({WORDS[part]})" for share, part in strange[:2])
         left += f", of which {parts}"
@@ -53,10 +56,15 @@ def reason_of(verdict, nrmse, noise, accounted, strange):
                          "noise (--noise-std)"}[verdict]
 
 
+def _percent(share):
+    return f"{share:.2%}" if share >= _SHOWN else f"less than {_SHOWN:.2%}"
+
+
 def set_aside(aside, drowned, valid):
     """Words for the samples that were not judged."""
     return "".join(
-        f"; {rows.sum()} samples ({rows.sum() / valid.sum():.2%}) do not count: {why} there"
+        "; " + several(rows.sum(), "sample does not count", "samples do not count")
+        + f" ({rows.sum() / valid.sum():.2%}): {why} there"
         for rows, why in ((aside, "a signal stood still or had spikes"),
                           (drowned, "bursts drown all else")) if rows.any())
 

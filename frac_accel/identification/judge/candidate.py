@@ -22,7 +22,7 @@ from ..fit.structures import (
     GainStructure,
     OscillatorStructure,
 )
-from ..response.excitation import learning_length, persistent_excitation, require_order
+from ..response.excitation import held_out, persistent_excitation, require_order
 from .fit_validation import band_fits
 from .measured_response import MeasuredResponse
 
@@ -71,10 +71,15 @@ class Data:
                    float(np.std(sensor[pair.valid])), MeasuredResponse.of(pair, axis), progress,
                    *excited, axis)
 
-    def fit(self, structure, part=slice(None), start=None, uncertainty=True, held=None):
-        """Fit of a structure to a part of the record; options as in `fit_output_error`."""
+    def fit(self, structure, start=None, uncertainty=True, held=None, without=None):
+        """Fit of a structure to the record, `without` some samples (a mask) if given; options as
+        in `fit_output_error`."""
+        valid, part = self.pair.valid, slice(None)
+        if without is not None:
+            # what comes after all that counts would only take time
+            valid, part = valid & ~without, slice(int(np.flatnonzero(~without)[-1]) + 1)
         record = (self.reference[part], self.sensor[part], self.pair.sampling_rate_hz,
-                  self.pair.valid[part], self.pair.lag_s)
+                  valid[part], self.pair.lag_s)
         if isinstance(structure, ArxStructure):
             return fit_arx(*record, start, uncertainty)
         hint = self.response.start(structure) if start is None else None
@@ -209,13 +214,13 @@ def _astray(data):
 
 
 def _held_out(structure, fit, data):
-    """Prediction of the last part of the record by a model fitted to the rest alone."""
+    """Prediction of a part of the record by a model fitted to the rest alone."""
     valid = data.pair.valid
-    split = learning_length(data.reference, valid)
-    if min(valid[:split].sum(), valid[split:].sum()) < _FEWEST:
+    rest = held_out(data.reference, valid)
+    if min((valid & ~rest).sum(), (valid & rest).sum()) < _FEWEST:
         return _NOTHING
     try:
-        learnt = data.fit(structure, slice(split), start=fit.unknowns, uncertainty=False)
-        return data.predicted(structure, learnt, slice(split, None))
+        learnt = data.fit(structure, start=fit.unknowns, uncertainty=False, without=rest)
+        return data.predicted(structure, learnt, rest)
     except FracAccelError:
         return _NOTHING

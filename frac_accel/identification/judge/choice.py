@@ -22,6 +22,9 @@ _TAKEN, _SEEMING = 0.5, 0.1
 # A resonance that far above the excited band, or known no better than this, is out of sight; of a
 # gain, the held-out residual over that with a resonance with which the gain will do.
 _IN_SIGHT, _UNDETERMINED, _NO_BETTER = 1.5, 0.2, 1.05
+# Share of an oscillator's own delay that a lead must take back to stand for a smoothed reference;
+# less is a clock's.
+_TAKEN_BACK = 0.1
 # Time constants after which a motion from before the record counts no more, and samples at both
 # ends that the band-limited simulation cannot know.
 _SETTLING = 7.0
@@ -87,7 +90,8 @@ def _flat_instead(candidates):
                         for values in (classical.fit.values, classical.fit.std))
     if flat.held_out_nrmse <= _NO_BETTER * classical.held_out_nrmse:
         why = "does not predict clearly better than a gain"
-    elif delay < -SIGNIFICANT * delay_std:
+    elif -delay > max(SIGNIFICANT * delay_std,
+                      _TAKEN_BACK * classical.fit["damping_ratio"] / (np.pi * resonance)):
         why = (f"would answer {-delay:.3g} s before the reference moves, as if that were smoothed; "
                "its parameters are open, and a gain is all that can be said")
     else:

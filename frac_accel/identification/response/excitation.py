@@ -12,8 +12,14 @@ from ...signals.averaged_spectra import coherence_of, power_of, segment_spectra
 _FLOOR = 1e-4
 # Bins over which the window (its side lobes are 92 dB down) spreads a pure line.
 _LINE_BINS = 8
-# Share of the reference's energy that a held-out check learns from.
-_LEARN = 0.6
+# Share of the reference's energy that a held-out check learns from; RMS of the rest, over that of
+# the former, below which it is too quiet for a judgement; stretches of which every other is then
+# held out.
+_LEARN, _QUIET_END, _STRETCHES = 0.6, 0.5, 20
+# Energy of a frequency before, over that after, below which it is new there; share of new energy
+# from which the record is a sweep; stretches of it, and samples that each and a spectrum's segment
+# have.
+_HARDLY, _MUCH_NEW, _OF_SWEEP, _SHORTEST, _SEGMENT = 0.1, 0.2, 100, 64, 1024
 # Share of the sensor's power that must come from the reference.
 _COHERENT = 0.8
 # Frequencies worth exciting, as shares of the sampling rate: below the resonance, and as high as
@@ -210,13 +216,21 @@ def strongest_stretch(reference, length, valid=None):
     return slice(first, first + length)
 
 
-def learning_length(reference, valid=None):
-    """Number of samples to learn from, by the reference's energy; the rest is held out.
+def held_out(reference, valid=None):
+    """Which samples are not learnt from, but judged on, as a mask.
 
-    Only `valid` samples count, if given.
+    The last ones, from where a share of the reference's energy has come. Where these are quiet, as
+    after a shock, or move at frequencies that come nowhere before, as in a sweep, every other
+    stretch. Only `valid` samples count, if given.
     """
     energy = _energy(reference, valid)
-    return int(np.searchsorted(energy, _LEARN * energy[-1]))
+    last = np.arange(len(reference)) >= np.searchsorted(energy, _LEARN * energy[-1])
+    moving = reference - reference.mean()
+    if np.std(moving[last]) < _QUIET_END * np.std(moving[~last]):
+        return alternating_stretches(reference, _STRETCHES)
+    if _is_new(moving[~last], moving[last]):
+        return alternating_stretches(reference, min(_OF_SWEEP, len(reference) // _SHORTEST))
+    return last
 
 
 def alternating_stretches(reference, count):
@@ -227,6 +241,16 @@ def alternating_stretches(reference, count):
     """
     energy = _energy(reference)
     return (energy * (count / max(energy[-1], 1e-300))).astype(int) % 2 == 1
+
+
+def _is_new(before, after):
+    """Whether much of a motion has frequencies that the one before it hardly has."""
+    length = min(len(before), len(after), _SEGMENT)
+    if length < _SHORTEST:
+        return False
+    known, energy = (len(part) * power_of(segment_spectra(part, "blackmanharris", length))
+                     for part in (before, after))
+    return energy[known < _HARDLY * energy].sum() > _MUCH_NEW * energy.sum()
 
 
 def _energy(reference, valid=None):
