@@ -8,6 +8,7 @@ import numpy as np
 from ..errors import FracAccelError
 from ..model import AXES
 from .clock import usable
+from .held import first_of_held
 from .pairing import FEWEST, by_slots, by_stamps, same_clock
 from .relation import clock_offset, refined
 from .resampling import within
@@ -237,13 +238,17 @@ class Record:
             or no temperature is finite.
         """
         column = AXES.index(axis)
+        (reference, held), (sensor, held_too) = map(first_of_held, (reference, sensor))
         one, two = Topic(reference, "reference"), Topic(sensor, "sensor")
         for topic in (one, two):
             _require_signal(topic, column)
         if np.array_equal(one.stamps_ns, two.stamps_ns):
             two.clock = one.clock
         offset = clock_offset(one, two, int(one.stamps_ns[0]))
-        taken_out, words = 0.0, []
+        taken_out = 0.0
+        words = [f"the {topic.name} holds each value for {length:.3g} samples: the first of them "
+                 f"counts, at {topic.clock.rate_hz:.4g} Hz"
+                 for topic, length in ((one, held), (two, held_too)) if length > 1]
         if offset is not None and _far(offset, one, two):
             taken_out = offset.seconds
             two.shift(-taken_out)

@@ -66,6 +66,11 @@ def second_set(rng, cause, rate_hz, core, output, sign):
         share = float(np.exp(rng.uniform(np.log(0.005), np.log(0.1))))
         return Family(1e-6 * level, 10 * level, lambda size: {"share": share, "rms": size})
 
+    def warm_up():
+        time_constant_s = float(duration * np.exp(rng.uniform(np.log(0.03), np.log(0.5))))
+        return Family(1e-6 * level, 3 * level, lambda size: {
+            "size": float(sign * size), "time_constant_s": time_constant_s})
+
     def reference_low_pass():
         return Family(0.5, 20.0, lambda size: {"corner_hz": rate_hz / size}, most=1.0)
 
@@ -84,6 +89,7 @@ def second_set(rng, cause, rate_hz, core, output, sign):
         "thermal_offset": lambda: single("coefficient_per_k", 1e-7 * level, level, sign, 1.0),
         "offset_drift": lambda: single("rate_per_s", 1e-6 * level / duration,
                                        5 * level / duration, sign, 1.0),
+        "warm_up": warm_up,
         "gain_step": lambda: step_of("ratio", 1e-6, 0.5, neutral=1.0, most=0.3),
         "offset_step": lambda: step_of("step", 1e-6 * level, 3 * level),
         "time_step": lambda: step_of("step_s", 1e-5 / rate_hz, 5 / rate_hz),
