@@ -11,7 +11,7 @@ from ..signals.convolution import Convolution
 from .gain import Gain, gain
 
 _ORDERS = (1, 2, 3, 4, 6)
-_LONGEST_SEGMENT = 4096
+_LONGEST_SEGMENT, _SHORTEST_SEGMENT = 4096, 32
 _FEWEST_SEGMENTS = 8
 # Reweighted linear fits, which converge within a few.
 _PASSES = 12
@@ -103,11 +103,14 @@ def fit_empirical_link(measured, simulated, used, held_out, sampling_rate_hz):
 
 
 def _segments(values, learn):
-    """Stretches without a gap, shape (k, m), each without its mean, half of it overlapping."""
+    """Stretches without a gap, shape (k, m), each without its mean, half of it overlapping: as
+    long as leaves enough of them."""
     size = min(_LONGEST_SEGMENT, len(values) // (2 * _FEWEST_SEGMENTS))
-    starts = np.arange(0, len(values) - size + 1, max(size // 2, 1))
-    place = starts[:, None] + np.arange(size)
-    place = place[learn[place].all(axis=1)] if size > 1 else place[:0]
+    place = np.empty((0, 1), int)
+    while len(place) < _FEWEST_SEGMENTS and size >= _SHORTEST_SEGMENT:
+        place = np.arange(0, len(values) - size + 1, size // 2)[:, None] + np.arange(size)
+        place = place[learn[place].all(axis=1)]
+        size //= 2
     return values[place] - values[place].mean(axis=1, keepdims=True)
 
 

@@ -4,6 +4,9 @@ import numpy as np
 
 # Whole numbers of intervals between stamps: what they scatter by at most, and how many are tried.
 _WHOLE, _MOST_PARTS = 0.1, 24
+# Tick, of the median step, from which stamps are rounded to it, and to which share of that step
+# stamps are exact; share of the steps that last one interval where that tells its length.
+_TICK, _OFF, _SINGLE = 0.1, 1e-3, 0.3
 
 
 def estimate_rate(stamps_ns):
@@ -32,6 +35,16 @@ def interval_of(steps):
     """
     median = np.median(steps)
     near = steps[steps <= 5 * median]
+    # stamps that were read as text or floats are off by some nanoseconds
+    digit = 10 ** np.floor(np.log10(_OFF * median))
+    tick = np.gcd.reduce(np.round(near / digit).astype(np.int64)) * digit
+    shortest = near.min()
+    # one interval lasts the whole ticks below its length or above it
+    single = near[near < shortest + 1.5 * tick]
+    if _TICK * median < tick < 0.75 * shortest and len(single) > _SINGLE * len(near):
+        interval = single.mean()
+        counts = near / interval
+        return interval, float(np.sqrt(np.mean((counts - np.maximum(np.round(counts), 1))**2)))
     fits = []
     for parts in range(1, _MOST_PARTS + 1):
         whole = np.maximum(np.round(near * parts / median), 1)

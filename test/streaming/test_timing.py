@@ -5,6 +5,7 @@ import pytest
 
 from frac_accel import Corrector
 from frac_accel.model import SensorModel
+from frac_accel.record.clock import Clock
 from frac_accel.signals.sample_rate import estimate_rate
 from frac_accel.streaming.timing import PATIENCE
 
@@ -60,6 +61,20 @@ def test_rate_through_jitter_gaps_duplicates_and_bursts(seed):
     stamps = START + np.round(times * 1e9).astype(np.int64)
     stamps[50] = stamps[49]                 # a duplicate
     assert abs(estimate_rate(stamps) / rate - 1) < 2e-3
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("rounded", [np.floor, np.round])
+def test_rate_of_stamps_that_are_rounded_to_milliseconds(seed, rounded):
+    rng = np.random.default_rng([71, seed])
+    rate = rng.uniform(80.0, 480.0)
+    ticks = rounded(1e3 * (np.arange(20_000) / rate + rng.uniform(0, 1e-3)))
+    kept = rng.random(len(ticks)) > rng.uniform(0, 0.4)
+    stamps = START + ticks[kept].astype(np.int64) * 1_000_000
+    assert abs(estimate_rate(stamps) / rate - 1) < 0.02
+    clock = Clock.of(stamps)
+    assert clock.kind == "regular" and abs(clock.rate_hz / rate - 1) < 1e-4
+    assert clock.slot[-1] == pytest.approx(np.flatnonzero(kept)[-1] - np.flatnonzero(kept)[0])
 
 
 @pytest.mark.parametrize("stamps", [[], [5], [5, 5, 5], [9, 5, 1]])

@@ -24,6 +24,8 @@ _UNRELATED = 0.15
 _AT_MOST = 0.5
 # Standard deviations by which the motion's rank in bursts may exceed that at any time.
 _DEVIATIONS = 4.0
+# Mean of the error in bursts, over its RMS there, up to which noise has it, too.
+_ONE_SIDED = 0.3
 # Share of the error budget that bursts must have.
 _SHOWN = 0.01
 # Share of the samples in bursts that may repeat the one before them: a sensor that is stuck.
@@ -71,6 +73,7 @@ class InterferenceBursts(Effect):
         mostly = share * (loud - noise) > _MOSTLY * np.mean(error**2)
         if len(starts) < (_FEWEST if mostly else _SEVERAL) or _going_on(error, noise) < _GOES_ON \
                 or _follows(inside, error, output, len(starts)) \
+                or _one_sided(error, inside, len(starts)) \
                 or _grows(error, output) > _AS_GOOD * better \
                 or _repeated(seen.measured[used], inside) > _REPEATED:
             return None
@@ -161,6 +164,13 @@ def _follows(inside, error, output, count):
         if abs(np.corrcoef(values[inside], error[inside])[0, 1]) > _allowed(samples):
             return True
     return False
+
+
+def _one_sided(error, inside, count):
+    """Whether the error in bursts has one sign: no noise, but what something else adds, such as a
+    turn about a point beside the sensor."""
+    mean = abs(np.mean(error[inside])) / np.sqrt(np.mean(error[inside]**2))
+    return mean > _ONE_SIDED + 3 / np.sqrt(count)
 
 
 def _grows(error, output):
