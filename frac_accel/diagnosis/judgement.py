@@ -270,7 +270,7 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
     if p.in_own_core:
         model, findings = in_own_core(model, findings, p.in_own_core, AXES[p.axis])
     return Diagnosis(
-        verdict, reason_of(verdict, account.error / spread, noise, account.accounted, strange)
+        verdict, reason_of(verdict, account.share, noise, account.accounted, strange)
         + set_aside(engine.aside, engine.drowned, engine.record.valid)
         + description_words([*described.values()], unnamed)
         + hidden_words(account.own, account.error),
@@ -320,14 +320,16 @@ def _sure(engine, best, findings, tied, left, fraction):
 
 class Account(NamedTuple):
     """RMS of the sensor's signal on held-out data (`spread`), and of what is left of it there
-    before and after; of what is left of the whole record (`error`), and of the noise that the
-    reference puts into it (`own`), all in output units; whether that is accounted for; and whether
-    it is no longer with the samples that were set aside."""
+    before and after; of what is left there or of the whole record (`error`), whichever is the
+    larger share (`share`) of its signal, and of the noise that the reference puts into it (`own`),
+    all in output units; whether that is accounted for; and whether it is no longer with the samples
+    that were set aside."""
 
     spread: float
     before: float
     after: float
     error: float
+    share: float
     own: float
     accounted: bool
     faulty: bool
@@ -348,17 +350,19 @@ def _account(engine, fitted, findings, noise):
     own = engine.by_reference(fitted)
     # the record is all of it, not only the part that is held out
     errors = p.errors(fitted)
-    error = max(after, _rms(errors, engine.wanted & np.isfinite(errors)))
+    whole, over = (_rms(errors, engine.wanted & np.isfinite(errors)),
+                   float(np.std(engine.record.sensor[engine.wanted, p.axis])))
+    error, of = max((after, spread), (whole, over), key=lambda pair: pair[0] / pair[1])
     # what is named may hide all else
     hidden = False if any(f.effect.read_off for f in findings) else engine.silent
     everywhere = _rms(errors, (engine.wanted | engine.aside | hidden) & np.isfinite(errors))
 
-    def is_covered(rms):
+    def is_covered(rms, spread):
         """Whether what the reference's own noise does not make is accounted for."""
         return is_accounted(np.sqrt(max(rms**2 - own**2, 0.0)), spread, noise)
-    accounted = is_covered(min([error, *by_itself]))
-    return Account(spread, before, after, error, own, accounted,
-                   accounted and not is_covered(everywhere))
+    accounted = is_covered(error, of) or any(is_covered(rms, spread) for rms in by_itself)
+    return Account(spread, before, after, error, error / of, own, accounted,
+                   accounted and not is_covered(everywhere, over))
 
 
 def _with_identified(engine, fitted, stds):

@@ -34,7 +34,7 @@ def undetermined(effect, unknowns, theta, stds, core, duration_s):
     """
     if effect.degenerate():
         return effect.degenerate()
-    moved = not unknowns
+    moved = []
     for unknown, place in zip(unknowns, theta):
         value, std = getattr(effect, unknown.name), stds.get(unknown.name, np.inf)
         if on_bound(unknown, place):
@@ -44,9 +44,10 @@ def undetermined(effect, unknowns, theta, stds, core, duration_s):
         if unknown.jumps and std > _ANY_TIME * duration_s:
             return f"{unknown.name} is open: {value:.3g} s ± {std:.1g} s"
         null = null_value(effect, unknown.name, core)
-        if null is None or not np.isfinite(null) or abs(value - null) > _DETERMINED * std:
-            moved = True
-    if not moved:
+        if null is not None and np.isfinite(null):
+            moved.append(abs(value - null) > _DETERMINED * std)
+    # one that has no such value, as an instant, does not tell that anything happens
+    if moved and not any(moved):
         return "no parameter differs from the value that changes nothing"
     return None
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-# Share of the samples that repeat the one before, and of the runs of equal ones that are about as
-# long as most, from which values are held: on a coarse lattice runs are of any length.
-_REPEATS, _ALIKE = 0.3, 0.97
+# Share of the samples that repeat the one before, and of those in runs of equal ones that are about
+# as long as most, from which values are held: on a coarse lattice, and at rest, runs are of any
+# length.
+_REPEATS, _ALIKE = 0.3, 0.95
 # Runs that show it.
 _FEWEST = 32
 
@@ -30,7 +31,7 @@ def first_of_held(samples):
     new = np.r_[True, np.any(samples.values[1:] != samples.values[:-1], axis=1)]
     length = np.diff(np.r_[np.flatnonzero(new), len(new)])
     if np.mean(~new) < _REPEATS or len(length) < _FEWEST \
-            or np.mean(np.abs(length - np.median(length)) <= 1) < _ALIKE:
+            or length[np.abs(length - np.median(length)) <= 1].sum() < _ALIKE * len(new):
         return samples, 1.0
     return type(samples).of(samples.stamps_ns[new], samples.values[new], samples.variance[new],
                             samples.frame_id), float(np.mean(length))

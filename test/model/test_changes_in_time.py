@@ -12,7 +12,7 @@ TEMPERATURE = 20 + 15 * np.sin(np.linspace(0, 7, N))
 # By cause, its parameters and what it makes of the motion q at the instants t.
 CAUSES = {
     "offset_drift": ({"rate_per_s": -0.02}, lambda t, q: q - 0.02 * t),
-    "warm_up": ({"size": 0.3, "time_constant_s": 4.0},
+    "warm_up_drift": ({"size": 0.3, "time_constant_s": 4.0},
                 lambda t, q: q + 0.3 * (1 - np.exp(-t / 4.0))),
     "thermal_offset": ({"coefficient_per_k": 0.004}, lambda t, q: q + 0.004 * (TEMPERATURE - 25)),
     "offset_step": ({"at_s": 3.0011, "step": 0.04}, lambda t, q: q + 0.04 * (t >= 3.0011)),

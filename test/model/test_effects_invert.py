@@ -19,7 +19,8 @@ NONLINEAR = ("cubic_stiffness", "quadratic_stiffness", "coulomb_friction", "hyst
 CORE = ("core_parameter_shift",)
 IN_TIME = ("clock_skew", "gain_drift", "temperature_sensitivity", "tone_interference")
 # in test_changes_in_time
-CHANGING = ("offset_drift", "warm_up", "thermal_offset", "offset_step", "gain_step", "time_step")
+CHANGING = ("offset_drift", "warm_up_drift", "thermal_offset", "offset_step", "gain_step",
+            "time_step")
 LOSSY = ("clipping", "dead_zone", "quantization", "dropped_samples", "timestamp_jitter")
 
 # in test_further_forces

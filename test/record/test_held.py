@@ -43,6 +43,14 @@ def test_coarse_values_and_stillness_are_not_held(seed, step):
     assert first_of_held(coarse) == (coarse, 1.0)
 
 
+def test_the_rest_around_a_shock_is_not_held():
+    rng = np.random.default_rng(884)
+    values = np.zeros((8000, 3))
+    values[4000:5000] = moving(rng, 1000)
+    still = samples(values)
+    assert first_of_held(still) == (still, 1.0)
+
+
 def test_a_record_says_that_values_are_held():
     rng = np.random.default_rng(883)
     values = moving(rng, 8000)

@@ -34,7 +34,7 @@ INSEPARABLE = (
     {"mounting_resonance", "second_resonance"}, {"reference_low_pass", "reference_smoothing"},
     {"cross_axis_sensitivity", "misalignment"}, {"sensitivity_error", "misalignment"},
     {"timestamp_jitter", "sampling_jitter"}, {"offset_drift", "thermal_offset"},
-    {"offset_drift", "warm_up"}, {"thermal_offset", "warm_up"},
+    {"offset_drift", "warm_up_drift"}, {"thermal_offset", "warm_up_drift"},
 )
 
 

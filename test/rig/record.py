@@ -282,8 +282,8 @@ def _static(effects, values, t, temperature_c, phase):
         values = values + effects["thermal_offset"]["coefficient_per_k"] * (temperature_c - 25)
     if "offset_drift" in effects:
         values = values + effects["offset_drift"]["rate_per_s"] * t
-    if "warm_up" in effects:
-        warm = effects["warm_up"]
+    if "warm_up_drift" in effects:
+        warm = effects["warm_up_drift"]
         values = values + warm["size"] * (1 - np.exp(-t / warm["time_constant_s"]))
     if "offset_step" in effects:
         values = values + effects["offset_step"]["step"] * (t >= effects["offset_step"]["at_s"])

@@ -89,7 +89,7 @@ def second_set(rng, cause, rate_hz, core, output, sign):
         "thermal_offset": lambda: single("coefficient_per_k", 1e-7 * level, level, sign, 1.0),
         "offset_drift": lambda: single("rate_per_s", 1e-6 * level / duration,
                                        5 * level / duration, sign, 1.0),
-        "warm_up": warm_up,
+        "warm_up_drift": warm_up,
         "gain_step": lambda: step_of("ratio", 1e-6, 0.5, neutral=1.0, most=0.3),
         "offset_step": lambda: step_of("step", 1e-6 * level, 3 * level),
         "time_step": lambda: step_of("step_s", 1e-5 / rate_hz, 5 / rate_hz),

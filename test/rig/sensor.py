@@ -35,7 +35,8 @@ SECOND_SET = (
     "stiffness_drift", "quadratic_damping", "impact_stop", "backlash", "second_resonance",
     "low_pass_filter", "linear_phase_filter",
     "time_step", "sampling_jitter",
-    "gain_step", "thermal_offset", "offset_drift", "offset_step", "warm_up", "interference_bursts",
+    "gain_step", "thermal_offset", "offset_drift", "offset_step", "warm_up_drift",
+    "interference_bursts",
     "reference_ac_coupling", "reference_low_pass", "reference_smoothing", "reference_delay",
     "reference_noise",
 )

@@ -97,7 +97,7 @@ def test_misalignment_turns_the_motion_into_the_sensors_axes():
 STATIC = {
     "thermal_offset": ({"coefficient_per_k": 0.02}, lambda a, t, c: a + 0.02 * (c - 25)),
     "offset_drift": ({"rate_per_s": -0.1}, lambda a, t, c: a - 0.1 * t),
-    "warm_up": ({"size": 0.4, "time_constant_s": 0.7},
+    "warm_up_drift": ({"size": 0.4, "time_constant_s": 0.7},
                 lambda a, t, c: a + 0.4 * (1 - np.exp(-t / 0.7))),
     "offset_step": ({"at_s": 1.2, "step": 0.5}, lambda a, t, c: a + 0.5 * (t >= 1.2)),
     "gain_step": ({"at_s": 1.2, "ratio": 0.9}, lambda a, t, c: a * np.where(t >= 1.2, 0.9, 1.0)),

@@ -75,16 +75,26 @@ def _flat_instead(candidates):
 
     Whatever else makes fast motion smaller, such as a smoothed reference, bends a resonance out
     there to its liking; it is believed only where it predicts clearly better.
+
+    Raises
+    ------
+    IdentificationError
+        If the oscillator predicts nothing of held-out data, and there is no gain either.
     """
+    nothing = False
     try:
         classical = candidates["oscillator"]
         data, resonance = candidates.data, classical.fit["natural_frequency_hz"]
         std = classical.fit.std[classical.fit.names.index("natural_frequency_hz")]
         highest = excited_band(data.reference, data.sensor, data.pair.sampling_rate_hz)[1]
-        if resonance < _IN_SIGHT * highest and std < _UNDETERMINED * resonance:
+        # such a one may have integrated the motion to follow a zero that wanders
+        nothing = classical.held_out_nrmse > 1
+        if resonance < _IN_SIGHT * highest and std < _UNDETERMINED * resonance and not nothing:
             return None
         flat = candidates["gain"]
     except IdentificationError:
+        if nothing:
+            raise
         return None
     delay, delay_std = (values[classical.fit.names.index("delay_s")]
                         for values in (classical.fit.values, classical.fit.std))

@@ -10,14 +10,14 @@ from .fit_starts import free
 
 
 @dataclasses.dataclass(frozen=True)
-class WarmUp(Effect):
+class WarmUpDrift(Effect):
     """Adds size (1 - exp(-t / time_constant_s)), t from the record's start.
 
     As a body warms that is heated evenly from an instant on and loses heat by its difference in
     temperature (Newton's law of cooling), with a zero that is proportional to it.
     """
 
-    cause = "warm_up"
+    cause = "warm_up_drift"
     stage = OFFSET
     explanation = "The zero of the output settles after switching on."
     shows_with_time = True
