@@ -101,7 +101,7 @@ def run(arguments):
         from ..fleet.store import Store
     except ModuleNotFoundError as error:
         raise FracAccelError(f"the Python library {error.name} is missing; install it with "
-                             "pip install frac_accel[fleet]") from None
+                             "pip install 'frac_accel[fleet]'") from None
     _require_utf_8([arguments.results, arguments.columns or ""])
     if arguments.workers < 1:
         raise FracAccelError(f"--workers: {arguments.workers} given, expected at least 1")
