@@ -21,7 +21,7 @@ VERBS = {
     "convert": "between MCAP, sqlite3, CSV, Parquet, MDF4 and numpy",
     "budget": "what is left, parted by kind, in seconds, without naming anything",
     "diagnose": "what a simulation gets wrong, the cause, the extension, the gain",
-    "fleet": "many bags through a verb, and what they show together",
+    "fleet": "many bags through a command, and what they show together",
     "report": "the page of a diagnosis again, from its result file",
     "watch": "live in the terminal: RMS, rate, latency and verdict of each sensor",
     "layout": "a layout for Foxglove or PlotJuggler, with the corrected samples' band",
@@ -29,7 +29,7 @@ VERBS = {
     "bench": "speed, latency and memory, beside peers in the same run",
     "completion": "a script that completes all this in bash, zsh or fish",
 }
-_MORE = "frac_accel VERB --help tells more of each, with examples."
+_MORE = "frac_accel COMMAND --help tells more of each, with examples."
 
 
 def main(arguments=None):
@@ -111,7 +111,7 @@ def _parser(verb, arguments):
         prog="frac_accel", epilog=_MORE,
         description="Simulate, identify, validate, correct and diagnose accelerometers.")
     parser.add_argument("--version", action="store_true", help="print the version")
-    verbs, parsers, module = parser.add_subparsers(dest="verb", metavar="VERB"), {}, None
+    verbs, parsers, module = parser.add_subparsers(dest="verb", metavar="COMMAND"), {}, None
     for name, summary in VERBS.items():
         parsers[name] = verbs.add_parser(name, help=summary)
         # a verb's libraries are loaded only if it, or its help, is asked for

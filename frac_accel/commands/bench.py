@@ -49,8 +49,8 @@ def run(arguments):
         if importlib.util.find_spec("rclpy") is not None:
             continue
         if arguments.suites:
-            raise FracAccelError(f"suite {name} needs rclpy (pip install ros-jazzy-rclpy[fastrtps] "
-                                 "ros-jazzy-common-interfaces, or a sourced ROS 2)")
+            raise FracAccelError(f"suite {name} needs rclpy (pip install 'frac_accel[ros]', or a "
+                                 "sourced ROS 2)")
         names.remove(name)
         notes.append(f"{name}: not measured, rclpy is not installed")
     if "uncertainty" in names and importlib.util.find_spec("PyDynamic") is None:

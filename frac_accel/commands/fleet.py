@@ -1,9 +1,9 @@
-"""Put many bags through a verb: on the cores of this machine, or on a cluster.
+"""Put many bags through a command: on the cores of this machine, or on a cluster.
 
-One row a bag and axis in Parquet below RESULTS/VERB/, partitioned by date; corrected bags, models,
-results and pages in RESULTS/VERB-files/; RESULTS/fleet.html shows the fleet at a glance. A bag is
-done once, by its content: the same command goes on where it was stopped. A bag that fails is a row
-with its error, and exit status 4.
+One row a bag and axis in Parquet below RESULTS/COMMAND/, partitioned by date; corrected bags,
+models, results and pages in RESULTS/COMMAND-files/; RESULTS/COMMAND.html shows the fleet at a
+glance. A bag is done once, by its content: the same command goes on where it was stopped. A bag
+that fails is a row with its error, and exit status 4.
 """
 
 import contextvars
@@ -32,7 +32,7 @@ _MEMORY_MB = 1500.0
 
 def add_arguments(parser):
     """Options of the verb."""
-    verbs = parser.add_subparsers(dest="each", metavar="VERB", required=True)
+    verbs = parser.add_subparsers(dest="each", metavar="COMMAND", required=True)
     for verb, add in (("diagnose", _add_diagnose), ("correct", _add_correct),
                       ("identify", _add_identify), ("validate", _add_validate)):
         sub = verbs.add_parser(verb, help=f"{verb} every bag")
@@ -101,7 +101,7 @@ def run(arguments):
         from ..fleet.store import Store
     except ModuleNotFoundError as error:
         raise FracAccelError(f"the Python library {error.name} is missing; install it with "
-                             "pip install frac_accel[fleet]") from None
+                             "pip install 'frac_accel[fleet]'") from None
     _require_utf_8([arguments.results, arguments.columns or ""])
     if arguments.workers < 1:
         raise FracAccelError(f"--workers: {arguments.workers} given, expected at least 1")

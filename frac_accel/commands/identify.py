@@ -6,7 +6,7 @@ mean, and whether they agree is said.
 
 from pathlib import Path
 
-from ..errors import naming
+from ..errors import FracAccelError, naming
 from ..io.outputs import say
 from ._common import (
     BAG_HELP,
@@ -105,6 +105,12 @@ def _print(result, pairs, bags):
 def _provenance(bags, command):
     """Where the first bag comes from, as for one; the others' names and hashes beside it."""
     first, *others = [provenance(bag, command) for bag in bags]
+    seen = {}
+    for bag, entry in zip(bags, [first, *others]):
+        if entry["sha256"] in seen:
+            raise FracAccelError(f"{bag}: holds the same record as {seen[entry['sha256']]}, which "
+                                 "would count twice; name it once")
+        seen[entry["sha256"]] = bag
     if others:
         first["further_bags"] = [{key: other[key] for key in ("bag", "sha256")}
                                  for other in others]

@@ -28,6 +28,13 @@ class Parser(argparse.ArgumentParser):
         words = next(map(self._misspelt, self._unknown_options()), message)
         self.exit(2, f"{self.prog}: {' '.join(words.split())}; see {self.prog} --help\n")
 
+    def _check_value(self, action, value):
+        """Refuse what is none of an argument's choices; argparse's own words name no nearest."""
+        if action.choices is not None and value not in action.choices:
+            choices = list(action.choices)
+            raise argparse.ArgumentError(action, f"{value!r} given, expected one of "
+                                         f"{', '.join(choices)}{nearest(value, choices)}")
+
     def _misspelt(self, option):
         return f"unknown option {option}{nearest(option, self._options())}"
 
@@ -57,5 +64,7 @@ def nearest(name, names):
     ": did you mean 'identify'?"
     """
     import difflib  # only after a mistake: the command is to start in no time
-    near = difflib.get_close_matches(name, names, 1)
-    return f": did you mean '{near[0]}'?" if near else ""
+    # the dashes of two options make them no more alike
+    bare = {other.lstrip("-"): other for other in names}
+    near = difflib.get_close_matches(name.lstrip("-"), bare, 1)
+    return f": did you mean '{bare[near[0]]}'?" if near else ""

@@ -1,7 +1,8 @@
 """Watch the correctors of this ROS domain in the terminal: RMS, rate, latency, verdict. q quits.
 
-A sensor is a line: what its corrector publishes about it once a second, and the last minute as
-sparklines. RMS is about the mean, of the three axes together.
+A sensor is a line: what its corrector publishes about it once a second, and its past as sparklines
+where the terminal has room for them. RMS is about the mean, of the three axes together, in m/s^2
+(raw: in the units of the raw messages). Of more sensors than fit, the worst are shown.
 """
 
 import contextlib
@@ -21,12 +22,14 @@ frac_accel watch front/imu rear/imu
 _BARS = "▁▂▃▄▅▆▇█"
 _COLOURS = ("green", "yellow", "red")
 _PERIOD_S = 0.25
-_TITLE = "frac_accel watch, q quits"
 # Time without a report after which a sensor counts as silent.
 _SILENT_S = 3.5
-# Columns of a terminal that holds the table, bars of a sparkline in it, and columns for each bar of
-# a narrower terminal.
-_WIDE, _BARS_WIDE, _PER_BAR = 140, 12, 10
+# Widths of a terminal from which sparklines are long, and from which there is room for them, for
+# the latency, and for the raw RMS.
+_WIDE, _MIDDLE, _NARROW, _TINY = 140, 116, 76, 60
+_LONG, _SHORT = 20, 8
+# Lines that title, heading and frame take.
+_FRAME_LINES = 6
 
 
 def add_arguments(parser):
@@ -37,8 +40,7 @@ def add_arguments(parser):
 
 def run(arguments):
     """Do it."""
-    for name, way in (("rclpy", "pip install ros-jazzy-rclpy[fastrtps] "
-                       "ros-jazzy-common-interfaces, or source a ROS 2"),
+    for name, way in (("rclpy", "pip install 'frac_accel[ros]', or source a ROS 2"),
                       ("rich", "pip install rich")):
         if importlib.util.find_spec(name) is None:
             raise FracAccelError(f"watch needs the Python library {name}: {way}")
@@ -59,66 +61,71 @@ def _show(watcher, wanted, pressed):
         while pressed() not in ("q", "Q", "\x1b"):
             sensors = [sensor for name, sensor in sorted(watcher.sensors.items())
                        if not wanted or any(part in name for part in wanted)]
-            live.update(table(sensors, time.monotonic(), console.width), refresh=True)
+            live.update(table(sensors, time.monotonic(), console.width, console.height),
+                        refresh=True)
             watcher.listen(_PERIOD_S)
 
 
-def table(sensors, now_s, width=_WIDE):
-    """What is known of some sensors for a terminal of that many columns: a table of rich, or where
-    that would not fit two lines for each."""
+def table(sensors, now_s, width=_WIDE, height=None):
+    """What is known of some sensors, as a table of rich; of more than fit, the worst."""
+    from rich import box
+    from rich.table import Table
     from rich.text import Text
     if not sensors:
         return Text("waiting for a corrector: nobody publishes /diagnostics or ~/metrics of one "
                     "in this ROS domain; q quits")
-    return _wide(sensors, now_s, width) if width >= _WIDE else _narrow(sensors, now_s, width)
-
-
-def _wide(sensors, now_s, width):
-    from rich.table import Table
-    drawn = Table(title=_TITLE, title_justify="left", expand=True)
-    for heading, right in (("sensor", False), ("raw RMS", True), ("", False),
-                           ("corrected RMS", True), ("", False), ("rate [Hz]", True),
-                           ("latency 99 %", True), ("verdict", False)):
-        drawn.add_column(heading, justify="right" if right else "left",
-                         no_wrap=right or not heading, overflow="fold",
-                         ratio=2 if heading == "verdict" else None)
-    for sensor in sensors:
+    lines = max(1, (height or math.inf) - _FRAME_LINES)
+    # a long verdict has a second line where there is room
+    is_tight = 2 * len(sensors) > lines
+    judged = {sensor.name: _verdict(sensor, now_s) for sensor in sensors}
+    shown, of = sensors, ""
+    if len(sensors) > lines:
+        worst = sorted(sensors, key=lambda sensor: -judged[sensor.name][0])[:lines]
+        shown = [sensor for sensor in sensors if sensor in worst]
+        of = f", the worst {lines} of {len(sensors)} sensors"
+    names = _short([sensor.name for sensor in shown])
+    drawn = Table(title=f"frac_accel watch, q quits{of}", title_justify="left", expand=True,
+                  box=box.HEAVY_HEAD if width >= _MIDDLE else box.SIMPLE_HEAD,
+                  padding=(0, width >= _NARROW))
+    headings = [("sensor", min(max(map(len, names)), width // (3 if width >= _NARROW else 4))),
+                ("raw RMS", 7), ("", None), ("corrected RMS", 9), ("", None),
+                ("rate [Hz]", 6), ("latency 99 %", 8), ("verdict", 12)]
+    hidden = {number for number, least in ((2, _MIDDLE), (4, _MIDDLE), (6, _NARROW), (1, _TINY))
+              if width < least}
+    for number, (heading, least) in enumerate(headings):
+        if number not in hidden:
+            is_text, is_verdict = heading in ("sensor", "verdict", ""), heading == "verdict"
+            drawn.add_column(heading, justify="left" if is_text else "right", min_width=least,
+                             width=least if not is_text and width < _MIDDLE else None,
+                             no_wrap=is_text and (is_tight or not is_verdict),
+                             overflow="fold" if is_verdict and not is_tight else "ellipsis",
+                             ratio=1 if is_verdict else None)
+    length = _LONG if width >= _WIDE else _SHORT
+    for name, sensor in zip(names, shown):
+        level, verdict = judged[sensor.name]
         figures = sensor.figures
-        drawn.add_row(
-            sensor.name, _number(_last(sensor.raw)), sparkline(list(sensor.raw)[-_BARS_WIDE:]),
-            _number(_last(sensor.corrected)), sparkline(list(sensor.corrected)[-_BARS_WIDE:]),
-            _number(figures.get("received_per_s", math.nan)), _latency(figures),
-            _verdict(sensor, now_s))
+        cells = [
+            name, _number(_last(sensor.raw)), sparkline(list(sensor.raw)[-length:]),
+            _number(_last(sensor.corrected)), sparkline(list(sensor.corrected)[-length:]),
+            _number(figures.get("received_per_s", math.nan)),
+            _number(1e3 * figures.get("latency_p99_s", math.nan), " ms"),
+            Text(verdict, style=_COLOURS[min(level, 2)])]
+        drawn.add_row(*(cell for number, cell in enumerate(cells) if number not in hidden))
     return drawn
 
 
-def _narrow(sensors, now_s, width):
-    from rich.text import Text
-    drawn = Text(_TITLE, style="bold")
-    for sensor in sensors:
-        drawn.append(f"\n{sensor.name}  ", style="bold")
-        drawn.append_text(_verdict(sensor, now_s))
-        figures, words = sensor.figures, []
-        for name, values in (("raw", sensor.raw), ("corrected", sensor.corrected)):
-            words.append(f"{name} {_number(_last(values))} "
-                         + sparkline(list(values)[-(width // _PER_BAR):]))
-        words.append(f"{_number(figures.get('received_per_s', math.nan))} Hz")
-        words.append(f"latency {_latency(figures)}")
-        drawn.append("\n  " + "  ".join(words), style="not bold")
-    return drawn
+def _short(names):
+    """Names without the part that says nothing beside a namespace."""
+    short = [name.removesuffix("/imu/data_raw") or name for name in names]
+    return short if len(set(short)) == len(names) else names
 
 
 def _verdict(sensor, now_s):
-    from rich.text import Text
-    level, verdict = sensor.level, sensor.verdict or "not yet judged"
+    """Level and words of a sensor's health; one that says nothing any more is not well."""
     silent_s = now_s - sensor.heard_s
     if silent_s > _SILENT_S:
-        level, verdict = 2, f"its corrector has been silent for {silent_s:.0f} s"
-    return Text(verdict, style=_COLOURS[min(level, 2)])
-
-
-def _latency(figures):
-    return _number(1e3 * figures.get("latency_p99_s", math.nan), " ms")
+        return 2, f"its corrector has been silent for {silent_s:.0f} s"
+    return sensor.level, sensor.verdict or "not yet judged"
 
 
 def sparkline(values):
@@ -143,7 +150,7 @@ def _last(values):
 def _number(value, unit=""):
     if not math.isfinite(value):
         return "–"
-    return f"{value:.0f}{unit}" if 1000 <= abs(value) < 1e6 else f"{value:.3g}{unit}"
+    return f"{value:.0f}{unit}" if 100 <= abs(value) < 1e6 else f"{value:.3g}{unit}"
 
 
 @contextlib.contextmanager

@@ -213,7 +213,7 @@ class Cluster:
             from distributed import Client
         except ModuleNotFoundError:
             raise FracAccelError("--scheduler needs the Python library distributed; install it "
-                                 "with pip install frac_accel[fleet]") from None
+                                 "with pip install 'frac_accel[fleet]'") from None
         end_s = time.monotonic() + seconds
         while True:
             try:

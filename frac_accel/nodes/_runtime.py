@@ -24,6 +24,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 
 from frac_accel.errors import FracAccelError
 from frac_accel.nodes._errors import NodeError
@@ -158,6 +159,7 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
     stop, service = _StopSignals(), ServiceManager()
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        _refuse_other_arguments(arguments)
         node = make_node()
         node.warn_of_unknown_parameters()
         executor = make_executor()
@@ -194,6 +196,14 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _refuse_other_arguments(arguments):
+    """A ``-p`` without ``--ros-args`` before it would be passed over without a word."""
+    own = remove_ros_args(sys.argv)[1:] if arguments is None else remove_ros_args(arguments)
+    if own:
+        raise NodeError(f"unknown argument {own[0]}: parameters come behind --ros-args, such as "
+                        "--ros-args -p model_file:=sensor.yaml; docs/nodes.md lists them")
 
 
 def make_executor():

@@ -212,12 +212,15 @@ def _response(seen, model):
             _band(figure, at, np.full(len(at), middle), std, row, legend=row == 1)
         words += " Band: 2u of the model's response by the uncertainty of its parameters."
     except FracAccelError as error:
-        words += f" Without a band: {error}."
+        words += f" No band of ± 2u is drawn, as the model file states none: {error}."
     for name, values, colour in ((_BEFORE, before, RESIDUAL), (_AFTER, after, MODEL)):
         ratio = (np.mean(np.conj(reference) * values, axis=0)[shown]
                  / power_of(reference)[shown])
         panels.line(figure, at, np.abs(ratio), 1, name, colour)
-        panels.line(figure, at, np.degrees(np.angle(ratio)), 2, name, colour, legend=False)
+        phase = np.degrees(np.angle(ratio))
+        # no line across the panel where it goes round
+        phase[1:][np.abs(np.diff(phase)) > 180] = np.nan
+        panels.line(figure, at, phase, 2, name, colour, legend=False)
     return panels.finished(figure), words
 
 

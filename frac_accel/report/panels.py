@@ -22,9 +22,10 @@ _UPRIGHT, _LEVEL = 24, 34
 # Samples above which a signal is drawn by its ends, and columns that these are drawn in: half the
 # pixels of a wide page.
 MOST_IN_LINE, _COLUMNS = 1600, 400
-# Decades of an axis from which 1, 2 and 5 are labelled, and up to which not only the powers of ten;
-# page.html has the same for what is zoomed into.
+# Decades of an axis from which 1, 2 and 5 are labelled, and up to which not only the powers of ten,
+# and values below which these are written as such; page.html has the same for what is zoomed into.
 _FEWEST_DECADES, _FEW_DECADES = 0.7, 3.2
+_TINY = 1e-4
 
 
 def rows(count, height, x_label, y_labels, weights=None, x_type="linear"):
@@ -60,7 +61,9 @@ def finished(figure):
             values = np.concatenate([[], *(np.asarray(trace[letter], float) for trace in own)])
             values = values[np.isfinite(values) & (values > 0)]
             decades = np.log10(values.max() / values.min()) if len(values) else 0.0
-            axis.update(tickformat="~g")
+            # 0.1, 0.01; over many decades powers of ten, not 0.000001 beside 1e-7
+            is_tiny = decades > _FEW_DECADES and values.min() < _TINY
+            axis.update(tickformat="" if is_tiny else "~g", exponentformat="power")
             if decades >= _FEWEST_DECADES:
                 axis.update(dtick="D2" if decades <= _FEW_DECADES else 1)
     return figure

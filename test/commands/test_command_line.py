@@ -74,6 +74,9 @@ def test_version(capsys):
     (["correct", "b.mcap", "--model", "m.yaml", "-o", "c.mcap", "--bandwidth", "wide"],
      "'wide' given, expected a number above 0"),
     (["validate", "b.mcap"], "required: --model"),
+    (["fleet", "diagnos", "drives"], "'diagnos' given, expected one of diagnose, correct, "
+     "identify, validate: did you mean 'diagnose'?"),
+    (["correct", "--version"], "unknown option --version; see"),
 ])
 def test_a_mistake_is_one_line_with_the_nearest_name(arguments, words, capsys):
     status, out, err = said(capsys, *arguments)
@@ -198,6 +201,14 @@ def test_an_error_in_one_of_several_bags_names_the_bag(bad, words, capsys, tmp_p
                           "-o", str(tmp_path / "m.yaml"))
     assert status == 2
     assert bad in err and words in err and "classical_bench" not in err
+
+
+def test_a_record_that_is_given_twice_is_refused(capsys, tmp_path):
+    """It would count twice, and its parameters would look surer than they are."""
+    copy = shutil.copy(BAGS / "classical_bench.mcap", tmp_path / "copy.mcap")
+    status, _, err = said(capsys, "identify", str(BAGS / "classical_bench.mcap"), str(copy),
+                          "-o", str(tmp_path / "m.yaml"))
+    assert status == 2 and f"{copy}: holds the same record as" in err
 
 
 def test_an_error_in_one_of_several_arrays_names_the_record():

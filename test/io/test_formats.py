@@ -6,6 +6,7 @@ What is read here is written by the formats' own libraries, not by the package.
 import csv
 import datetime
 import sqlite3
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -234,12 +235,17 @@ REFUSED = [
     ("x [g]\n1\n", [], "--rate HZ"),
     ("time [s],x [furlong]\n0,1\n", [], "unit 'furlong' is not known"),
     ("time [h],x [g]\n0,1\n", [], "expected s, ms, us or ns"),
-    ("time [s],x [g]\n0,one\n1,two\n", [], "column 'x' holds no numbers"),
+    ("time [s],x [g]\n0,one\n1,two\n", [], "column 'x' holds 'one', expected numbers"),
+    ("time [s],x [g]\n0,1\n1,two\n", [], "column 'x' holds 'two', expected numbers"),
+    ("time [s],x [g]\n", [], "has no rows with values for /imu/data_raw"),
+    ("time [s],x [g],x [mg]\n0,1,2\n", [], "two columns are named 'x': rename one"),
+    ("time [s],x [g]\n0,\x81\n", [], "is no text, neither in UTF-8 nor in cp1252"),
     ("time [s],x [g]\n0,1\n,2\n", [], "no time in row 1"),
     ("time [s],x [g]\n0,1\n1,2,3\n", [], "Expected 2 columns, got 3"),
     ("time [s],x [g]\n1e300,1\n", [], "no stamp can hold"),
     ("", [], "is empty"),
-    ("time [s],a\n0,1\n", ["--map", "/imu/reference=b", "--unit", "g"], "no columns b"),
+    ("time [s],a\n0,1\n", ["--map", "/imu/reference=b", "--unit", "g"],
+     "no column 'b' for /imu/reference, but"),
     ("time [s],a\n0,1\n", ["--map", "/imu/reference=a,b,c,d"], "expected /TOPIC=X"),
     ("time [s],a\n0,1\n", ["--map", "/imu/reference=a", "--time", "t"], "no column 't'"),
 ]
@@ -247,7 +253,7 @@ REFUSED = [
 
 @pytest.mark.parametrize("text, options, words", REFUSED)
 def test_refusals_are_one_line(text, options, words, folder, capsys):
-    (folder / "in.csv").write_text(text)
+    (folder / "in.csv").write_bytes(text.encode("latin-1"))
     try:
         status = main(["convert", "in.csv", "-o", "out.mcap", *options])
     except SystemExit as stopped:
@@ -316,6 +322,26 @@ def test_small_files_that_unpack_to_too_much_are_refused(end, folder, monkeypatc
         parquet.write_table(pyarrow.table({"time_s": nothing, "x [g]": nothing}), "in.parquet")
     with pytest.raises(BagError, match="unpacks to 16000"):
         read_bag(f"in.{end}")
+
+
+def test_arrays_of_no_real_numbers_are_refused(folder, capsys):
+    np.save("in.npy", np.ones(3, complex))
+    assert main(["convert", "in.npy", "-o", "out.mcap", "--unit", "g", "--rate", "9"]) == 2
+    assert "holds (1+0j), expected numbers" in capsys.readouterr().err
+    np.save("in.npy", np.array([{}], object), allow_pickle=True)
+    assert main(["convert", "in.npy", "-o", "out.mcap", "--unit", "g", "--rate", "9"]) == 2
+    err = capsys.readouterr().err
+    assert "Python objects, which are never read" in err and "allow_pickle" not in err
+
+
+@pytest.mark.parametrize("command", ["correct", "simulate"])
+def test_a_bag_is_not_written_under_the_name_of_another_format(command, folder, capsys):
+    """A folder called ``out.csv`` was made."""
+    bags = Path(__file__).parents[2] / "bags"
+    assert main([command, str(bags / "classical_bench.mcap"), "--model",
+                 str(bags / "classical_bench.yaml"), "-o", "out.csv"]) == 2
+    assert "frac_accel convert makes a .csv of one" in capsys.readouterr().err
+    assert not list(folder.iterdir())
 
 
 def test_formats_that_cannot_be_written_are_refused(bag, folder, capsys):

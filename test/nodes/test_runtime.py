@@ -1,5 +1,6 @@
 """The nodes' shared subscription takes all waiting messages, counts losses, and falls back."""
 
+import sys
 import time
 
 import pytest
@@ -24,6 +25,7 @@ from frac_accel.nodes._runtime import (  # noqa: E402
     FracAccelNode,
     import_message_class,
     normalised,
+    run_node,
 )
 
 pytestmark = pytest.mark.ros
@@ -227,3 +229,11 @@ def test_message_classes_by_name():
     for name in ("sensor_msgs/msg/NoSuch", "no_such_pkg/msg/Imu", "Imu", "os.path/x/y", ""):
         with pytest.raises(NodeError, match="is not"):
             import_message_class(name)
+
+
+def test_arguments_that_are_not_for_ros_are_refused(monkeypatch, capsys):
+    """``-p`` without ``--ros-args`` was passed over, and the corrector ran without a model."""
+    monkeypatch.setattr(sys, "argv", ["corrector", "-p", "model_file:=sensor.yaml"])
+    assert run_node(FracAccelNode) == 2
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert "unknown argument -p: parameters come behind --ros-args" in line

@@ -141,13 +141,41 @@ def test_a_silent_corrector_and_missing_figures_are_said():
     sensor = Seen("/front/imu/data_raw", 60)
     sensor.verdict, sensor.heard_s = "all is well", 100.0
     sensor.take({"x/raw/std": 3.0, "y/raw/std": 4.0, "received_per_s": 99.6})
-    for width in (140, 80, 40):
-        for now_s, words in ((101.0, "all is well"), (160.0, "silent for 60 s")):
-            console = Console(width=width, record=True, file=open(os.devnull, "w"))
-            console.print(table([sensor], now_s, width))
-            text = " ".join(console.export_text().split())
-            assert sensor.name in text and words in text
-            assert " 5 " in text and "99.6" in text and "–" in text
+    for now_s, words in ((101.0, "all is well"), (160.0, "silent for 60 s")):
+        console = Console(width=140, record=True, file=open(os.devnull, "w"))
+        console.print(table([sensor], now_s, 140))
+        text = console.export_text()
+        assert words in text and " 5 " in text and "99.6" in text and "–" in text
+
+
+@pytest.mark.parametrize("width", [50, 60, 71, 75, 76, 80, 100, 115, 116, 120, 139, 140, 200])
+def test_name_rate_and_verdict_stand_in_terminals_of_any_width(width):
+    """At 60 columns sensors had no names and no verdicts, and rates read 1e+03."""
+    sensor = Seen("/vehicle/front_axle/imu/data_raw", 60)
+    sensor.verdict = "correcting at 1000 Hz"
+    sensor.take({"x/raw/std": 3.0, "x/corrected/std": 2.0, "received_per_s": 999.7})
+    lines = drawn([sensor], width)
+    row = next(line for line in lines if "1000" in line)
+    assert "/vehicle/fr" in row and "correcting" in row
+    assert all(len(line) <= width for line in lines)
+
+
+def test_of_more_sensors_than_fit_the_worst_are_shown():
+    sensors = [Seen(f"/seat_{number}/imu/data_raw", 60) for number in range(50)]
+    for sensor in sensors:
+        sensor.level, sensor.verdict = 0, "correcting at 400 Hz"
+    sensors[47].level, sensors[47].verdict = 2, "no message"
+    lines = drawn(sensors, 80, 24)
+    assert len(lines) <= 24 and "the worst 18 of 50 sensors" in lines[0]
+    assert any("/seat_47" in line and "no message" in line for line in lines)
+
+
+def drawn(sensors, width, height=None):
+    """Lines of a table."""
+    from rich.console import Console
+    console = Console(width=width, record=True, file=open(os.devnull, "w"))
+    console.print(table(sensors, 0.0, width, height))
+    return console.export_text().splitlines()
 
 
 @pytest.mark.parametrize("values, bars", [

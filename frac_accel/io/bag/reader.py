@@ -125,7 +125,8 @@ class BagReader:
                 self._folder_warnings.append(f"{error}; the file is skipped")
                 self._files.append(_Unreadable())
         if self.recovered and not any(file.segments and file.channels for file in self._files):
-            raise BagError(f"{self.path}: nothing is readable: {'; '.join(self.warnings)}")
+            words = "; ".join(warning.removeprefix(f"{self.path}: ") for warning in self.warnings)
+            raise BagError(f"{self.path}: nothing is readable: {words}")
         self.topics = self._topic_infos()
 
     def __enter__(self) -> BagReader:

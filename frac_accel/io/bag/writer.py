@@ -20,6 +20,8 @@ from frac_accel.io.outputs import stage
 _MAX_TIME = 2**63 - 1
 _METADATA_VERSION = 9
 _ROS_DISTRO = "jazzy"
+# Names of what `frac_accel convert` makes, of which a folder of MCAP files is none.
+_BY_CONVERT = (".db3", ".csv", ".parquet", ".npz", ".mf4")
 
 
 class _Topic(NamedTuple):
@@ -41,8 +43,8 @@ class BagWriter:
     Parameters
     ----------
     path : target
-        A bare file if the name ends in .mcap, else a rosbag2 folder.  Existing folders are
-        refused, existing files only with ``in_place``.
+        A bare file if the name ends in .mcap, else a rosbag2 folder; a name of another format is
+        refused.  So are existing folders, and existing files with ``in_place``.
     in_place : see above
 
     Raises
@@ -55,7 +57,11 @@ class BagWriter:
         self.path = Path(path)
         self.counts: dict[str, int] = {}
         self._in_place = in_place
-        self._is_folder = self.path.suffix != ".mcap"
+        suffix = self.path.suffix.lower()
+        if suffix in _BY_CONVERT:
+            raise BagError(f"{path}: bags are written as MCAP, expected a name that ends in .mcap, "
+                           f"or a new folder; frac_accel convert makes a {suffix} of one")
+        self._is_folder = suffix != ".mcap"
         if self.path.exists() and (self._is_folder or in_place or self.path.is_dir()):
             raise BagError(f"{path}: exists already")
         self._topics: dict[str, _Topic] = {}

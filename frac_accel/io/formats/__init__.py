@@ -91,7 +91,8 @@ def convert(sources, target):
         If a topic is in two of them, or the target cannot be written.
     """
     target = Path(target)
-    if target.suffix.lower() not in ("", ".mcap", ".db3", *TABLES) or target.suffix == ".npy":
+    if target.suffix.lower() not in ("", ".mcap", ".db3", *TABLES) \
+            or target.suffix.lower() == ".npy":
         raise BagError(f"{target}: is of no format that can be written, expected a name that ends "
                        "in .mcap, .db3, .csv, .parquet, .npz or .mf4, or a new folder")
     infos = [info for source in sources for info in source.topics.values() if info.count]
@@ -105,7 +106,7 @@ def convert(sources, target):
             return _write_table(sources, infos, kind, target)
         messages = heapq.merge(*(source.messages() for source in sources),
                                key=lambda message: message.log_time_ns)
-        if target.suffix == ".db3":
+        if target.suffix.lower() == ".db3":
             return _write_output(target, lambda path: write_sqlite(path, infos, messages), infos)
         from ..bag import BagWriter
         with BagWriter(target) as writer:

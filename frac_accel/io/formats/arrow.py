@@ -28,12 +28,15 @@ def read_csv(path):
     row = following[0] if following else ""
     units = [cell.strip() for cell in row.split(delimiter)]
     has_units = any(units) and not any(map(_is_number, units))
-    comma = delimiter == ";" and any("," in line for line in following[:3])
-    table = csv.read_csv(
-        path, csv.ReadOptions(skip_rows=passed, skip_rows_after_names=int(has_units),
-                              encoding=encoding),
-        csv.ParseOptions(delimiter=delimiter),
-        csv.ConvertOptions(decimal_point="," if comma else ".", strings_can_be_null=True))
+    comma = delimiter == ";" and any("," in line for line in following)
+    try:
+        table = csv.read_csv(
+            path, csv.ReadOptions(skip_rows=passed, skip_rows_after_names=int(has_units),
+                                  encoding=encoding),
+            csv.ParseOptions(delimiter=delimiter),
+            csv.ConvertOptions(decimal_point="," if comma else ".", strings_can_be_null=True))
+    except UnicodeDecodeError:
+        raise BagError(f"{path}: is no text, neither in UTF-8 nor in cp1252") from None
     return [_group(table, units if has_units else ())]
 
 

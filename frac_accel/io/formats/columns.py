@@ -34,10 +34,14 @@ _SECONDS = ("seconds", "seconds_elapsed", "__time")
 
 
 class Column(NamedTuple):
-    """Values (n,) of a column, and its unit ("" where none is stated)."""
+    """Values (n,) of a column, and its unit ("" where none is stated).
+
+    ``is_double`` where a table has two of that name: nobody can say which is meant.
+    """
 
     values: np.ndarray
     unit: str
+    is_double: bool = False
 
 
 def split_unit(name):
@@ -58,7 +62,7 @@ class Group(NamedTuple):
         columns = {}
         for name, values, unit in named:
             name, own = split_unit(name)
-            columns[name] = Column(np.asarray(values), unit or own)
+            columns[name] = Column(np.asarray(values), unit or own, name in columns)
         return cls("", columns)
 
     def split(self):
@@ -69,7 +73,7 @@ class Group(NamedTuple):
         groups = []
         for topic in dict.fromkeys(topics.tolist()):
             rows = topics == topic
-            columns = {name: Column(column.values[rows], column.unit)
+            columns = {name: column._replace(values=column.values[rows])
                        for name, column in self.columns.items() if name != "topic"}
             groups.append(Group(topic, {name: column for name, column in columns.items()
                                         if not _is_empty(column.values)}))
@@ -135,6 +139,8 @@ def topics_of(groups, wishes, where):
     missing = [topic for topic in wishes.axes if topic not in found]
     if missing or not found:
         raise BagError(f"{where}: {_unrecognised(groups, wishes, missing)}")
+    if not any(len(content.stamps_ns) for content in found.values()):
+        raise BagError(f"{where}: has no rows with values for {', '.join(found)}")
     return found
 
 
@@ -155,7 +161,7 @@ def _fields(group, wishes):
 
 
 def _content(group, topic, fields, wishes):
-    columns = {field: group.columns[name] for field, name in fields.items()}
+    columns = {field: _the(group, name) for field, name in fields.items()}
     if len({len(column.values) for column in columns.values()}) > 1:
         raise FracAccelError(f"columns {', '.join(fields.values())} are not as long")
     empty = np.all([_is_missing(column.values) for column in columns.values()], axis=0)
@@ -232,13 +238,20 @@ def _time(group, topic, wishes):
     if wishes.time:
         if wishes.time not in group.columns:
             raise FracAccelError(f"has no column '{wishes.time}', but {_names(group)}")
-        return wishes.time, group.columns[wishes.time]
+        return wishes.time, _the(group, wishes.time)
     own = {name.lower(): name for name in group.columns}
     for name in (f"{topic}/stamp".lower(), *_TIMES):
         if name in own:
-            return own[name], group.columns[own[name]]
+            return own[name], _the(group, own[name])
     raise FracAccelError(f"has no column of time among {_names(group)}: convert it with --time "
                          "COLUMN, or with --rate HZ where there is none")
+
+
+def _the(group, name):
+    """The only column of that name."""
+    if group.columns[name].is_double:
+        raise FracAccelError(f"two columns are named '{name}': rename one")
+    return group.columns[name]
 
 
 def _beside(group, topic, field):
@@ -248,9 +261,20 @@ def _beside(group, topic, field):
 
 def _numbers(column, name):
     try:
-        return np.asarray(column.values).astype(float)
+        if column.values.dtype.kind != "c":
+            return column.values.astype(float)
     except (TypeError, ValueError):
-        raise FracAccelError(f"column '{name}' holds no numbers") from None
+        pass
+    odd = next(value for value in column.values.tolist() if not _is_number(value))
+    raise FracAccelError(f"column '{name}' holds {odd!r}, expected numbers")
+
+
+def _is_number(value):
+    try:
+        float(value)
+    except (TypeError, ValueError):
+        return False
+    return True
 
 
 def _is_missing(values):
@@ -270,7 +294,10 @@ def _unrecognised(groups, wishes, missing):
     if missing:
         topic = missing[0]
         wanted = [name for name in wishes.axes[topic] if name != "-"]
-        return f"has no columns {', '.join(wanted)} for {topic} together, but {there}"
+        absent = [name for name in wanted if not any(name in group.columns for group in groups)]
+        if absent:
+            return f"has no column {', '.join(map(repr, absent))} for {topic}, but {there}"
+        return f"has the columns {', '.join(wanted)} for {topic} not in one group, but {there}"
     return (f"no column is named as a topic's (/imu/reference/x [m/s^2] and so on), but {there}: "
             "say which is which, such as frac_accel convert FILE -o OUT.mcap "
             "--map /imu/reference=COLUMN --map /imu/data_raw=COLUMN --unit g")

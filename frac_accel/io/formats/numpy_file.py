@@ -53,7 +53,11 @@ def _load(path):
 
 
 def _unreadable(path, error):
-    return BagError(f"{path}: cannot be read: {' '.join(str(error).split())}")
+    words = " ".join(str(error).split())
+    if "pickle" in words:
+        # numpy's words advise to read what may run any code
+        words = "it is no file of numpy's, or holds Python objects, which are never read"
+    return BagError(f"{path}: cannot be read: {words}")
 
 
 def _columns(path, name, array):
@@ -61,7 +65,8 @@ def _columns(path, name, array):
     if array.ndim == 1:
         return [(name or "x", array, "")]
     if array.ndim != 2 or not 1 <= array.shape[1] <= 3:
-        raise BagError(f"{path}: array '{name}' has shape {array.shape}, expected (n,) or (n, 3)")
+        of = f"array '{name}'" if name else "its array"
+        raise BagError(f"{path}: {of} has shape {array.shape}, expected (n,) or (n, 3)")
     name, unit = split_unit(name)
     return [(f"{name}/{axis}" if name else axis, array[:, i], unit)
             for i, axis in zip(range(array.shape[1]), "xyz")]
