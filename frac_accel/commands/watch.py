@@ -26,7 +26,7 @@ _PERIOD_S = 0.25
 _SILENT_S = 3.5
 # Widths of a terminal from which sparklines are long, and from which there is room for them, for
 # the latency, and for the raw RMS.
-_WIDE, _MIDDLE, _NARROW, _TINY = 140, 116, 76, 60
+_WIDE, _MIDDLE, _NARROW, _TINY = 140, 116, 78, 60
 _LONG, _SHORT = 20, 8
 # Lines that title, heading and frame take.
 _FRAME_LINES = 6
