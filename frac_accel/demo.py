@@ -24,7 +24,7 @@ from .model import AXES, SensorModel
 from .model.parameters import as_mapping
 from .record import Record
 from .report.identification import identification_page
-from .report.quantity import written
+from .report.quantity import scaled, written
 from .shown import above, plain_logarithms
 from .streaming import Corrector
 from .validation import compare
@@ -94,9 +94,12 @@ def parameters(result, truth):
             known.update(as_mapping(part))
     lines = ["parameter              identified ± standard uncertainty"]
     for name, entry in result.parameters.items():
-        true = f"  true: {known[name]:g} {entry['unit']}" if name in known else ""
+        true = ""
+        if name in known:
+            unit = scaled(known[name], entry["unit"])
+            true = f"  true: {known[name] * unit.factor:g} {unit.unit}"
         found = written(entry["value"], entry["std"], entry["unit"])
-        lines.append(f"  {name:21} {found:40}{true}".rstrip().removesuffix(" 1"))
+        lines.append(f"  {name:21} {found:40}{true}".rstrip())
     lines.append(f"residual {result.nrmse:.2%} of the output, {result.held_out_nrmse:.2%} on "
                  "held-out data")
     return "\n".join(lines + [f"note: {note}" for note in result.notes])

@@ -3,7 +3,7 @@
 import time
 
 from frac_accel import streaming
-from frac_accel.errors import FracAccelError
+from frac_accel.errors import FracAccelError, naming
 from frac_accel.io import cdr
 from frac_accel.nodes._channel import Channel
 from frac_accel.nodes._errors import NodeError
@@ -48,7 +48,8 @@ class Sensor:
         self.channels, self._reference_s = [], None
         self._reference_subscription = self._temperature_subscription = None
         try:
-            self._open()
+            with naming(f"sensor '{name}'" if name else ""):
+                self._open()
         except BaseException:
             self.destroy()
             raise
@@ -58,7 +59,7 @@ class Sensor:
         if self.value("model_file"):
             model, self.model_hash = node.load(self.value("model_file"))
         elif name:
-            raise NodeError(f"sensor '{name}': parameter '{name}.model_file' is missing")
+            raise NodeError(f"parameter '{name}.model_file' is missing")
         type_name = self.value("message_type")
         if name:
             topics = self._own_topics(_BLOCKS if type_name == cdr.POINT_CLOUD2 else _SAMPLES)
@@ -66,6 +67,7 @@ class Sensor:
         else:
             self.channels.append(self._channel(type_name, _SAMPLES))
             self.channels.append(self._channel(cdr.POINT_CLOUD2, _BLOCKS, "blocks/", True))
+        self._check_outputs()
         if model:
             for channel in self.channels:
                 channel.topic.offer(model, self._wishes())
@@ -79,6 +81,17 @@ class Sensor:
         if topic := self._temperature_topic(model):
             self._temperature_subscription = subscribe_temperature(
                 node, [channel.topic for channel in self.channels], topic)
+
+    def _check_outputs(self):
+        """Refuse what would correct its own output, or mix it with that of another sensor."""
+        for channel in self.channels:
+            raw, corrected = channel.topic.name, channel.topic.output.topic_name
+            if raw == corrected:
+                raise NodeError(f"{raw} is the raw and the corrected topic, expected two")
+            for other in self._node.sensors.values():
+                if corrected in (each.topic.output.topic_name for each in other.channels):
+                    raise NodeError(f"{corrected} is the corrected topic of sensor "
+                                    f"'{other.name}', too")
 
     def value(self, name):
         """Value of a parameter: the sensor's own, or the node's where it has none."""

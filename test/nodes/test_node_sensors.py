@@ -176,6 +176,12 @@ def test_where_nothing_may_change_no_sensor_comes_or_goes(tmp_path, models):
     ({"sensors": ["front"], "model_file": ""}, "front.model_file"),
     ({"sensors": ["front"], "front": {"bandwidth_hz": -1.0}}, "front.bandwidth_hz"),
     ({"sensors": ["front"], "front": {"raw_topic": "a b"}}, "a b"),
+    ({"sensors": ["front", "rear"], "rear": {"bandwidth_hz": 600.0, "sample_rate_hz": 1000.0}},
+     "sensor 'rear': bandwidth_hz"),
+    ({"sensors": ["front", "rear"], "front": {"namespace": "a"}, "rear": {"namespace": "a"}},
+     "sensor 'rear': /a/imu/data is the corrected topic of sensor 'front', too"),
+    ({"sensors": ["front"], "front": {"raw_topic": "/a", "corrected_topic": "/a"}},
+     "/a is the raw and the corrected topic"),
 ])
 def test_what_cannot_be_is_one_line_and_status_2(parameters, words, tmp_path, models):
     arguments = parameters_file(tmp_path, **{"model_file": str(models[0]), **parameters})
