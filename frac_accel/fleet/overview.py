@@ -56,7 +56,7 @@ class Overview:
     @property
     def words(self):
         """The same in lines of text."""
-        lines = [f"{self.bags} rows of {self.vehicles} vehicles: "
+        lines = [f"{self.bags} rows of {self.vehicles} vehicle{'s' * (self.vehicles != 1)}: "
                  + ", ".join(f"{count} {name}" for name, count in self.verdicts.items())]
         lines += [f"  {cause}: named in {bags} bags of {vehicles} vehicles"
                   for cause, bags, vehicles in self.causes]
@@ -65,7 +65,8 @@ class Overview:
                   for entry in self.common]
         lines += [f"together: {weak_words(effect)}" for effect in self.weak]
         lines += [f"odd: {odd_words(entry)}" for entry in self.odd[:20]]
-        lines += [f"error: {entry['bag']}: {entry['error']}" for entry in self.failed[:20]]
+        lines += [f"error: {entry['bag']}: {entry['error'].removeprefix(entry['bag'] + ': ')}"
+                  for entry in self.failed[:20]]
         if len(self.failed) > 20:
             lines.append(f"and {len(self.failed) - 20} more bags with an error")
         return lines
