@@ -5,6 +5,7 @@ import dataclasses
 
 import numpy as np
 
+from ..shown import several
 from .estimates import Estimates
 from .groups import groups_of
 from .peers import common_causes, odd_vehicles
@@ -56,7 +57,7 @@ class Overview:
     @property
     def words(self):
         """The same in lines of text."""
-        lines = [f"{self.bags} rows of {self.vehicles} vehicle{'s' * (self.vehicles != 1)}: "
+        lines = [f"{several(self.bags, 'row')} of {several(self.vehicles, 'vehicle')}: "
                  + ", ".join(f"{count} {name}" for name, count in self.verdicts.items())]
         lines += [f"  {cause}: named in {bags} bags of {vehicles} vehicles"
                   for cause, bags, vehicles in self.causes]
