@@ -29,6 +29,7 @@ numpydoc_show_class_members = False
 autodoc_typehints = "none"
 html_theme = "furo"         # reads well on a phone
 html_title = f"frac_accel {version}"
+html_show_copyright = False  # the licence says whose it is
 # what numpydoc makes of docstrings has sections twice on a page
 suppress_warnings = ["myst.header", "docutils"]
 

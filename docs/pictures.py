@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import rig.hidden
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 from rig.sensor import CAUSES, SECOND_SET
 from scipy.signal import butter, sosfiltfilt
 
@@ -81,8 +82,10 @@ def draw(cause, seed=_SEED):
     for values, colour in ((measured, "#8a919a"), (left, "#d9772b")):
         density = np.sqrt(power_of(segment_spectra(values, "hann", _SEGMENT)) / rate)[1:]
         spectra.loglog(frequency, density, color=colour, lw=1)
-    spectra.set(xlabel="frequency [Hz]", ylabel="density")
+    spectra.set(xlabel="frequency [Hz]", ylabel="density [output units/√Hz]")
     plain_logarithms(spectra)
+    # 100, 200, 500 and 1000 have no room beside each other
+    spectra.xaxis.set_major_locator(LogLocator())
     return figure
 
 

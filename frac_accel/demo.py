@@ -35,6 +35,7 @@ BAGS = shared_folder("bags")
 _PATIENCE_S = 90
 # Of the record, in the picture.
 _SHOWN_S = 0.3
+_LEAST_ERROR = 1e-4
 
 
 def main(arguments=None):
@@ -145,6 +146,8 @@ def picture(results, path):
         errors.semilogy(time_s, np.abs(result.after - result.reference)[first], color="#3f9bd8",
                         lw=0.8)
         errors.set_ylabel("|error| [m/s²]")
+        # where an error changes its sign, it goes down without end
+        errors.set_ylim(bottom=_LEAST_ERROR)
         plain_logarithms(errors)
     above(rows[0][0])
     rows[0][0].set_title(f"acceleration, first {_SHOWN_S} s", pad=20)

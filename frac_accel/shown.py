@@ -44,11 +44,13 @@ def above(axes: Any) -> None:
 
 def plain_logarithms(axes: Any) -> None:
     """Label logarithmic axes with 0.1, 0.2, 0.5, 1, or with powers of ten where these are many."""
-    from matplotlib.ticker import LogLocator, NullFormatter
+    from matplotlib.ticker import LogFormatterMathtext, LogLocator, NullFormatter
     for axis in (axes.xaxis, axes.yaxis):
         if axis.get_scale() != "log":
             continue
         low, high = axis.get_view_interval()
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 2000 * low else (1,)))
-        axis.set_major_formatter("{x:g}")
+        is_short = high < 2000 * low
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if is_short else (1,)))
+        # 0.0001 beside 1e-05 reads badly
+        axis.set_major_formatter("{x:g}" if is_short or low > 1e-5 else LogFormatterMathtext())
         axis.set_minor_formatter(NullFormatter())

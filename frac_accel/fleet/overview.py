@@ -5,6 +5,7 @@ import dataclasses
 
 import numpy as np
 
+from ..shown import several
 from .estimates import Estimates
 from .groups import groups_of
 from .peers import common_causes, odd_vehicles
@@ -56,7 +57,7 @@ class Overview:
     @property
     def words(self):
         """The same in lines of text."""
-        lines = [f"{self.bags} rows of {self.vehicles} vehicles: "
+        lines = [f"{several(self.bags, 'row')} of {several(self.vehicles, 'vehicle')}: "
                  + ", ".join(f"{count} {name}" for name, count in self.verdicts.items())]
         lines += [f"  {cause}: named in {bags} bags of {vehicles} vehicles"
                   for cause, bags, vehicles in self.causes]
@@ -65,7 +66,8 @@ class Overview:
                   for entry in self.common]
         lines += [f"together: {weak_words(effect)}" for effect in self.weak]
         lines += [f"odd: {odd_words(entry)}" for entry in self.odd[:20]]
-        lines += [f"error: {entry['bag']}: {entry['error']}" for entry in self.failed[:20]]
+        lines += [f"error: {entry['bag']}: {entry['error'].removeprefix(entry['bag'] + ': ')}"
+                  for entry in self.failed[:20]]
         if len(self.failed) > 20:
             lines.append(f"and {len(self.failed) - 20} more bags with an error")
         return lines
