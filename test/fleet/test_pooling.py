@@ -88,21 +88,25 @@ def lots(seed):
 
 @pytest.mark.parametrize("cause", ["cubic_stiffness", "sensitivity_error", "gain_drift"])
 def test_an_effect_too_weak_for_a_bag_is_found_in_its_lot(fleet, cause):
-    rng = np.random.default_rng(7)
     # a bag names nothing below 30 variances; this is a quarter of that size
     size = np.sqrt(30) / 4 / np.median([one.own_part(cause) for one in fleet[:WEAK]])
-    drawn = [one.drawn(rng, cause, size) if i < WEAK else one.drawn(rng)
-             for i, one in enumerate(fleet)]
-    estimates = Estimates.of(drawn)
-    place = next(i for i, (name, _) in enumerate(estimates.names) if name == cause)
-    alone = np.abs(estimates.values[:WEAK, place] / estimates.stds[:WEAK, place])
-    assert np.max(alone) < np.sqrt(30)
-    found, rest = weak_effects(estimates, lots(7))
-    first = found[0]
-    assert first.group == "lot = B"
-    assert cause == first.cause or cause in first.confusable_with
-    assert len(found) == 1, found
-    assert odd_vehicles(rest, list(range(VEHICLES))) == []
+    draws, seen = 10, 0
+    for seed in range(7, 7 + draws):
+        rng = np.random.default_rng(seed)
+        estimates = Estimates.of([one.drawn(rng, cause, size) if i < WEAK else one.drawn(rng)
+                                  for i, one in enumerate(fleet)])
+        place = next(i for i, (name, _) in enumerate(estimates.names) if name == cause)
+        alone = np.abs(estimates.values[:WEAK, place] / estimates.stds[:WEAK, place])
+        assert np.max(alone) < np.sqrt(30)
+        found, rest = weak_effects(estimates, lots(seed))
+        assert len(found) <= 1, found
+        for first in found:
+            assert first.group == "lot = B"
+            assert cause == first.cause or cause in first.confusable_with
+            assert odd_vehicles(rest, list(range(VEHICLES))) == []
+        seen += len(found)
+    # measured: 9 or 10 of 10; each cause of the catalogue is one more hypothesis to stand against
+    assert seen >= 8
 
 
 def test_a_fleet_without_effects_shows_none(fleet):
