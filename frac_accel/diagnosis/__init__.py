@@ -142,7 +142,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
                            + " far out, alone, while the reference does not: spikes, which count "
                            "in no fit")
     engine.spikes, engine.aside = stray, stray | (record.valid & ~moving)
-    engine.at_limit = at_limit
+    engine.at_limit, engine.found = at_limit, found
     engine.identified = {cause: effect for cause, effect in (seed or {}).items() if effect.everyday}
     _require_relation(engine, axis, seed)
     best = engine.run(seed)
@@ -229,7 +229,7 @@ def _without_drowned(begin, engine, best, found, seed):
     other = begin(used=engine.wanted & ~hidden)
     other.spikes, other.aside = engine.spikes | hidden, engine.aside & ~hidden
     other.drowned, other.at_limit = hidden, engine.at_limit
-    other.identified = engine.identified
+    other.identified, other.found = engine.identified, engine.found
     return other, other.run(seed)
 
 

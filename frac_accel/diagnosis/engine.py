@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from ..budget import Division, established_noise
 from ..errors import FracAccelError
 from ..identification.fit.uncertainty import by_blocks, sandwich
-from ..identification.response.excitation import held_out
+from ..identification.response.excitation import held_out, is_new
 from ..model import AxisModel, is_link
 from ..model.effects import effect_of
 from .gain import gain
@@ -18,6 +18,7 @@ from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
 from .problem import Problem, acts_on_spring
 from .search import Search
+from .seen import added
 from .stages import COMPARED
 from .stretches import Stretches, stretches_of
 from .words import is_accounted
@@ -82,6 +83,8 @@ class Engine:
         self.problem = Stretches(*given, slices, in_own_core) if slices[1:] else \
             Problem(*given, in_own_core)
         self.part = None
+        # `Integrity` of the record, where what it shows by itself is looked for
+        self.found = None
         self.uncontested, self.best = set(), None
         self._step = step
         # the record, and its samples that may count: of a very long one, more than are fitted
@@ -140,7 +143,7 @@ class Engine:
             self.part = Engine(p.part(rows), p.axis, p.baseline, p.taken(self.wanted)[rows],
                                self.search.base, self.search.candidates, self.search.stages,
                                self._step, p.limit, self.passed_on, self.loose, p.in_own_core)
-            self.part.identified = self.identified
+            self.part.identified, self.part.found = self.identified, self.found
             return self.part.run(seed)
         self.best = self.compete(self.search.run(self.threshold, self.promises, self.noise_only,
                                                  seed))
@@ -149,11 +152,14 @@ class Engine:
     def whole(self, effects):
         """The set that a part of a long record has shown, fitted to the whole.
 
-        Only what takes time to show is added.
+        Only what takes time to show is added, and in a sweep what acts on slow motion.
         """
-        known = self._beside_base(effects)
+        p, known = self.problem, self._beside_base(effects)
+        reference, rows = p.record.reference[:, p.axis], p.strongest(LONG // 2)
+        sweeps = is_new(reference[rows], np.delete(reference, rows))
         self.search.candidates = [cause for cause in self.search.candidates
-                                  if effect_of(cause).shows_with_time]
+                                  if effect_of(cause).shows_with_time
+                                  or (sweeps and effect_of(cause).acts_on_slow_motion)]
         self.uncontested = self.part.uncontested
         best = self.search.grow([known], self.threshold, self.promises, self.noise_only, _SLOW)
         if best.causes > known.keys() | self.search.base.keys():
@@ -603,11 +609,21 @@ class Engine:
         p = self.problem
         across = [signal for axis, signal in enumerate(p.record.reference.T)
                   if axis != p.axis and np.ptp(signal)]
-        found = leftover(fitted.residual, fitted.simulated, p.used, across,
-                         self.coarse_step(fitted))
+        found = self._leftover(fitted, fitted.residual, across)
+        if found.share > 0 and self.found is not None:
+            known = added(self, fitted)
+            if known.any():
+                rest = self._leftover(fitted, fitted.residual - known, across)
+                of_all = (rest.rms / found.rms)**2
+                found = dataclasses.replace(rest, rms=found.rms, linear=of_all * rest.linear,
+                                            level=of_all * rest.level)
         own = self._no_fault(fitted)
         return dataclasses.replace(found, linear=max(found.linear - own, 0.0),
                                    level=max(found.level - own, 0.0))
+
+    def _leftover(self, fitted, residual, across):
+        return leftover(residual, fitted.simulated, self.problem.used, across,
+                        self.coarse_step(fitted))
 
 
 def _once(store, fitted, make):

@@ -282,8 +282,8 @@ class Search:
     def _option(self, start, fitted, cause, known, rows, share):
         """(Cost to be expected, cause, effect to begin with) of one start, or None."""
         p, changes = self.problem, []
-        own = p.own_motions(start.effect)[rows]
-        own = _orthonormal(own - known @ (known.T @ own))
+        slow = _orthonormal(p.own_motions(start.effect)[rows])
+        own = _orthonormal(slow - known @ (known.T @ slow))
         known = np.hstack([known, own])
         residual = fitted.residual[rows]
         residual = residual - known @ (known.T @ residual)
@@ -295,7 +295,8 @@ class Search:
                     if later else p.change(fitted.effects, cause, effect)
             except FracAccelError:
                 return None
-            change = change[rows]
+            # a ramp of its own can be far larger than all that it changes besides
+            change = change[rows] - slow @ (slow.T @ change[rows])
             changes.append(change - known @ (known.T @ change))
             if changes[-1] @ changes[-1] <= _NOTHING_NEW * (change @ change):
                 return None

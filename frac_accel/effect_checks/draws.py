@@ -1,5 +1,7 @@
 """Random parameters of a cause, and the sensor and motion on which it is tried."""
 
+import dataclasses
+
 import numpy as np
 
 from ..errors import ModelError
@@ -52,7 +54,9 @@ class Draws:
         raise Broken(f"none of {_TRIES} draws from the declared ranges is accepted: {refusal}")
 
     def _fixed(self, field):
-        """A count or a word."""
+        """A count, a word or what no fit varies."""
+        if field.metadata.get("fixed"):
+            return field.default if field.default is not dataclasses.MISSING else 1.0
         if field.metadata.get("choices"):
             return str(self.rng.choice(field.metadata["choices"]))
         low, high = span(field)

@@ -70,8 +70,7 @@ class AxisModel:
     @property
     def behind_base(self):
         """The same without the effects on what is recorded of the base, and these."""
-        on_base = tuple(effect for effect in self.effects
-                        if type(effect).change_base is not Effect.change_base)
+        on_base = tuple(effect for effect in self.effects if effect.changes_base())
         return AxisModel(self.core, tuple(effect for effect in self.effects
                                           if effect not in on_base)), on_base
 

@@ -12,7 +12,7 @@ _OUTPUT = "output units"
 
 
 def parameter(unit, *, above=None, minimum=None, below=None, maximum=None, default=None,
-              null=None, scale=None, reach=None, step=None, whole=False, jumps=False):
+              null=None, scale=None, reach=None, step=None, whole=False, fixed=False, jumps=False):
     """Declare a number of a core or an effect.
 
     Parameters
@@ -36,13 +36,15 @@ def parameter(unit, *, above=None, minimum=None, below=None, maximum=None, defau
         Default 1e-3.
     whole : bool
         Whether it counts something; no fit varies it (`Effect.alternatives` offers others).
+    fixed : bool
+        Whether no fit varies it although it counts nothing.
     jumps : bool
         True where the output does not change smoothly, such as for the instant of a step: its
         derivative is then the mean slope from `step` below to `step` above.
     """
     metadata = {"unit": unit, "above": above, "minimum": minimum, "below": below,
                 "maximum": maximum, "null": null, "scale": scale, "reach": reach, "step": step,
-                "whole": whole, "jumps": jumps}
+                "whole": whole, "fixed": fixed, "jumps": jumps}
     if default is None:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
@@ -99,8 +101,8 @@ def choice(*words):
 
 
 def is_varied(field):
-    """Whether a fit can vary a parameter: a number that counts nothing."""
-    return not any(field.metadata.get(key) for key in ("list", "choices", "whole"))
+    """Whether a fit can vary a parameter: a number that counts nothing and is not fixed."""
+    return not any(field.metadata.get(key) for key in ("list", "choices", "whole", "fixed"))
 
 
 def fixed_values(instance):

@@ -195,7 +195,7 @@ class AxisSimulator:
         """Output of the core and its links, delay and clock: before the effects on the samples."""
         axis_model, on_base = axis_model.behind_base
         if on_base:
-            return kept(self._bases, on_base, self._behind, on_base, most=1).respond(axis_model)
+            return kept(self._bases, on_base, self._behind, on_base, most=2).respond(axis_model)
         if axis_model.changes_base:
             gain = axis_model.base_gain(self.circumstances.time_s + self._lag_s)
             return self._with_base(gain * (self._moving + self._level))._respond(axis_model)

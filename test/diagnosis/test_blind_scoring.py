@@ -144,8 +144,8 @@ def test_trials_are_unique_and_no_seed_is_in_two_sets():
     assert {t.group for t in plans[0]} == set(GROUPS)
     counts = {group: sum(t.group == group for t in plans[0]) for group in GROUPS}
     assert counts == {"single": 440, "multiple": 60, "clean": 100, "outside": 190,
-                      "without_model": 54, "power": 528, "second_set": 276,
-                      "road_single": 216, "road_multiple": 40, "road_clean": 60,
+                      "without_model": 54, "power": 528, "second_set": 288,
+                      "road_single": 222, "road_multiple": 40, "road_clean": 60,
                       "road_outside": 114}
     assert not {t.seed for t in plans[0]} & {t.seed for t in plans[1]}
     assert len(plan(0, ["single"], first=2)) == 44

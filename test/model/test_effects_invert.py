@@ -30,7 +30,7 @@ TURNED = ("misalignment",)
 # in test_backlash
 PATH = ("backlash",)
 # in test_residual_causes
-BY_POWER = ("sampling_jitter", "interference_bursts")
+BY_POWER = ("sampling_jitter", "polled_readout", "interference_bursts")
 
 # in test_linear_causes
 LINKS = ("second_resonance", "low_pass_filter", "linear_phase_filter")

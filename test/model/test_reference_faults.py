@@ -63,7 +63,7 @@ def test_no_part_of_the_correction(cause):
 
 
 def test_the_key_is_read_and_written(tmp_path):
-    faults = [{"cause": "reference_ac_coupling", "corner_hz": 1.9}]
+    faults = [{"cause": "reference_ac_coupling", "corner_hz": 1.9, "known_from_hz": 0.3}]
     model({"type": "gain"}, reference_faults=faults).save(tmp_path / "m.yaml")
     again = SensorModel.load(tmp_path / "m.yaml")
     assert again.to_dict()["reference_faults"] == faults

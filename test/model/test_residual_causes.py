@@ -7,7 +7,7 @@ from second_set_bench import RATE, Multisine, model, samples, times
 from frac_accel import Corrector
 from frac_accel.diagnosis import diagnose
 
-N, NOISE = 8000, 0.01
+N, NOISE, POLLED_S = 8000, 0.01, 6.11e-4
 
 
 def bursts(rng, share):
@@ -23,7 +23,15 @@ def record(kind, seed):
     """Instants, reference and what the sensor says."""
     rng = np.random.default_rng(seed)
     t, sine = times(N / RATE), Multisine(rng)
-    scatter = 2e-4 * rng.normal(size=N) if kind == "sampling_jitter" else 0.0
+    scatter = 0.0
+    if kind == "sampling_jitter":
+        scatter = 2e-4 * rng.normal(size=N)
+    elif kind == "polled_readout":
+        # the motion at the last tick of another clock, whose oscillator wanders
+        count = (t + 1e-5 * np.sin(t)) / POLLED_S + rng.random()
+        scatter = POLLED_S * (0.5 - count % 1)
+    elif kind == "sine in time":
+        scatter = 3e-4 * np.sin(2 * np.pi * 87.3 * t)
     values = sine.motion(t + scatter) + NOISE * rng.normal(size=N)
     if kind == "interference_bursts":
         values += 0.3 * bursts(rng, 0.03) * rng.normal(size=N)
@@ -33,6 +41,8 @@ def record(kind, seed):
         values[rng.integers(0, N, 8)] += 0.5
     elif kind == "gain noise":
         values *= 1 + 0.05 * rng.normal(size=N)
+    elif kind == "gain with a beat":
+        values *= 1 + 0.05 * ((87.3 * t) % 1 - 0.5)
     elif kind == "moving delay":
         values = sine.motion(t + 3e-4 * np.sin(2 * np.pi * 1.3 * t)) + NOISE * rng.normal(size=N)
     elif kind == "loose contact":
@@ -51,7 +61,7 @@ def found(kind, seed):
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("cause, truth", [
     ("sampling_jitter", {"rms_s": 2e-4}), ("interference_bursts", {"share": 0.03, "rms": 0.3}),
-    ("quantization", {"step": 0.153})])
+    ("quantization", {"step": 0.153}), ("polled_readout", {"interval_s": POLLED_S})])
 def test_recognised_and_nothing_else(cause, truth, seed):
     findings = found(cause, seed)
     assert set(findings) == {cause}
@@ -63,9 +73,11 @@ def test_recognised_and_nothing_else(cause, truth, seed):
 
 
 @pytest.mark.parametrize("kind", ["nothing", "spikes", "gain noise", "moving delay",
-                                  "loose contact", "heavy tails"])
+                                  "loose contact", "heavy tails", "sine in time",
+                                  "gain with a beat"])
 def test_neither_where_it_is_something_else(kind):
-    assert not {"sampling_jitter", "interference_bursts", "quantization"} & set(found(kind, 7))
+    assert not {"sampling_jitter", "polled_readout", "interference_bursts",
+                "quantization"} & set(found(kind, 7))
 
 
 @pytest.mark.parametrize("seed", (10, 11))

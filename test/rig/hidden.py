@@ -33,7 +33,8 @@ INSEPARABLE = (
     {"low_pass_lag", "linear_phase_filter"}, {"time_delay", "linear_phase_filter"},
     {"mounting_resonance", "second_resonance"}, {"reference_low_pass", "reference_smoothing"},
     {"cross_axis_sensitivity", "misalignment"}, {"sensitivity_error", "misalignment"},
-    {"timestamp_jitter", "sampling_jitter"}, {"offset_drift", "thermal_offset"},
+    {"timestamp_jitter", "sampling_jitter"}, {"polled_readout", "sampling_jitter"},
+    {"polled_readout", "timestamp_jitter"}, {"offset_drift", "thermal_offset"},
     {"offset_drift", "warm_up_drift"}, {"thermal_offset", "warm_up_drift"},
 )
 

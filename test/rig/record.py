@@ -90,6 +90,8 @@ def simulate_record(sensor, excitation, rng=None, snr_db=60.0, noise_std=None, n
     scatter = None
     if rng is not None and "sampling_jitter" in effects:
         scatter = rng.normal(size=len(t)) * effects["sampling_jitter"]["rms_s"]
+    if rng is not None and "polled_readout" in effects:
+        scatter = _age(rng, t, **effects["polled_readout"])
     clean, scattered = _output(sensor, excitation, t, np.interp(t, reference_t, temperature_c),
                                phases, scatter)
 
@@ -294,6 +296,16 @@ def _static(effects, values, t, temperature_c, phase):
         tone = effects["tone_interference"]
         values = values + tone["amplitude"] * np.sin(2 * np.pi * tone["frequency_hz"] * t + phase)
     return values
+
+
+def _age(rng, t, interval_s):
+    """How much younger than on average a value is that another clock has read, whose oscillator
+    wanders by some 1e-4 with a memory of ten seconds."""
+    step_s = t[1] - t[0]
+    keeps = np.exp(-step_s / 10)
+    off = scipy.signal.lfilter([np.sqrt(1 - keeps**2)], [1, -keeps], rng.normal(size=len(t)))
+    count = (t + 1e-4 * np.cumsum(off) * step_s) / interval_s + rng.random()
+    return interval_s * (0.5 - count % 1)
 
 
 def _bursts(rng, count, share, rms):

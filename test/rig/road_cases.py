@@ -166,6 +166,7 @@ def _draw_surroundings(rng, causes, rate_hz):
     quiet = {"reference_noise": {"reference_snr_db": np.inf}, "quantization": {"lattice": False},
              "interference_bursts": {"spikes": None}, "dropped_samples": {"lost": 0.0},
              "timestamp_jitter": {"jitter": 0.0}, "sampling_jitter": {"jitter": 0.0},
+             "polled_readout": {"jitter": 0.0},
              "clock_skew": {"skew_ppm": 0.0}, "time_step": {"skew_ppm": 0.0},
              "held_values": {"lost": 0.0}, "batched_stamps": {"lost": 0.0, "jitter": 0.0}}
     for cause in causes & set(quiet):

@@ -77,6 +77,8 @@ class Bench:
         own = effects[cause]
         if cause in ("timestamp_jitter", "sampling_jitter"):
             return _rms(np.gradient(without) * self.rate_hz) * own["rms_s"]
+        if cause == "polled_readout":
+            return _rms(np.gradient(without) * self.rate_hz) * own["interval_s"] / np.sqrt(12)
         if cause == "dropped_samples":
             return _rms(np.diff(without)) * float(np.sqrt(own["fraction"]))
         if cause == "batched_stamps":

@@ -95,6 +95,8 @@ def second_set(rng, cause, rate_hz, core, output, sign):
         "time_step": lambda: step_of("step_s", 1e-5 / rate_hz, 5 / rate_hz),
         "stiffness_drift": lambda: single("rate_per_s", 1e-6 / duration, 0.4 / duration, sign),
         "sampling_jitter": lambda: single("rms_s", 2e-8, 0.3 / rate_hz),
+        # slower than the logger, it would be a sensor whose values are held
+        "polled_readout": lambda: single("interval_s", 2e-8, 0.9 / rate_hz),
         "quadratic_damping": lambda: single("coefficient", 1e-7 / level, 10 / level),
         "impact_stop": impact_stop,
         "backlash": lambda: single("gap", 1e-6 * level, level),

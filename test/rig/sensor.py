@@ -34,7 +34,7 @@ SECOND_SET = (
     "misalignment",
     "stiffness_drift", "quadratic_damping", "impact_stop", "backlash", "second_resonance",
     "low_pass_filter", "linear_phase_filter",
-    "time_step", "sampling_jitter",
+    "time_step", "sampling_jitter", "polled_readout",
     "gain_step", "thermal_offset", "offset_drift", "offset_step", "warm_up_drift",
     "interference_bursts",
     "reference_ac_coupling", "reference_low_pass", "reference_smoothing", "reference_delay",

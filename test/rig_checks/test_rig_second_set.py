@@ -142,6 +142,22 @@ def test_sampling_jitter_moves_the_instants_of_all_axes_together():
     assert np.allclose(record.clean, record.reference, atol=1e-9)
 
 
+def test_a_polled_value_is_up_to_one_interval_old():
+    excitation = steady_sine(37.0)
+    sensor = flat({"polled_readout": {"interval_s": 4.3e-4}})
+    record = rig.simulate_record(sensor, excitation, np.random.default_rng(2), noise_std=0)
+    t = times(excitation)
+    slope = 2 * np.pi * 37.0 * np.cos(2 * np.pi * 37.0 * t + 0.3)
+    steep = np.abs(slope) > 0.7 * slope.max()
+    value = np.clip(record.sensor[:, 0], -1, 1)
+    branch = np.where(slope > 0, np.arcsin(value), np.pi - np.arcsin(value))
+    lag = np.angle(np.exp(1j * (branch - 2 * np.pi * 37.0 * t - 0.3)))[steep] / (2 * np.pi * 37.0)
+    # as often at any age
+    assert np.allclose(np.quantile(lag, [0.005, 0.5, 0.995]), 4.3e-4 * np.array(
+        [-0.495, 0, 0.495]), atol=2e-5)
+    assert np.allclose(record.clean, record.reference, atol=1e-9)
+
+
 def test_bursts_take_their_share_at_their_level():
     excitation = rig.band_noise(np.random.default_rng(0), RATE, 60.0, (2, 300))
     record = rig.simulate_record(flat({"interference_bursts": {"share": 0.1, "rms": 3.0}}),

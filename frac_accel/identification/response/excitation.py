@@ -228,7 +228,7 @@ def held_out(reference, valid=None):
     moving = reference - reference.mean()
     if np.std(moving[last]) < _QUIET_END * np.std(moving[~last]):
         return alternating_stretches(reference, _STRETCHES)
-    if _is_new(moving[~last], moving[last]):
+    if is_new(moving[~last], moving[last]):
         return alternating_stretches(reference, min(_OF_SWEEP, len(reference) // _SHORTEST))
     return last
 
@@ -243,7 +243,7 @@ def alternating_stretches(reference, count):
     return (energy * (count / max(energy[-1], 1e-300))).astype(int) % 2 == 1
 
 
-def _is_new(before, after):
+def is_new(before, after):
     """Whether much of a motion has frequencies that the one before it hardly has."""
     length = min(len(before), len(after), _SEGMENT)
     if length < _SHORTEST:

@@ -15,6 +15,7 @@ class AcCoupling(Effect):
 
     cause = "ac_coupling"
     stage = CONDITIONER
+    acts_on_slow_motion = True
     explanation = "The conditioner is coupled through a high-pass, so slow motion is lost."
     experiment = ("Hold a constant acceleration, such as gravity after turning the sensor over: "
                   "behind a high-pass the output returns to zero.")

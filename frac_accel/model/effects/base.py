@@ -62,6 +62,8 @@ class Reading(NamedTuple):
         Samples of the record in which it drowns whatever else may be wrong.
     evident : bool
         Whether it is certain, be it seen in one stretch of the record only.
+    added : ndarray, shape (n,), optional
+        What it adds to the output, where that is known sample by sample.
     """
 
     std: dict
@@ -70,6 +72,7 @@ class Reading(NamedTuple):
     evidence: str
     drowned: np.ndarray | None = None
     evident: bool = False
+    added: np.ndarray | None = None
 
 
 class Open(NamedTuple):
@@ -108,6 +111,8 @@ class Effect:
     mirrors: ClassVar[str | None] = None
     # True for what a record shows by itself (`of_record`, `reading`), and no fit looks for
     read_off: ClassVar[bool] = False
+    # True where a record that shows it tells what it adds to each sample (`Reading.added`)
+    known_by_sample: ClassVar[bool] = False
     # True for what leaves noise whose size follows the motion's
     goes_with_size: ClassVar[bool] = False
     # True where one clock or one way to the stamps makes it the same for all axes
@@ -120,6 +125,8 @@ class Effect:
     nested: ClassVar[tuple[str, ...]] = ()
     # True for what grows along a record, so that a part of it may not show it
     shows_with_time: ClassVar[bool] = False
+    # True for what acts on slow motion, which the strongest part of a record may lack
+    acts_on_slow_motion: ClassVar[bool] = False
     # True for what is so common and so cheap to fit that every search begins with it, too
     everyday: ClassVar[bool] = False
     # name among the parameters that `identify` finds beside a core
@@ -216,7 +223,7 @@ class Effect:
 
         Parameters
         ----------
-        seen : diagnosis.read_off.Seen
+        seen : diagnosis.seen.Seen
         """
         return None
 
@@ -226,7 +233,7 @@ class Effect:
 
         Parameters
         ----------
-        seen : diagnosis.read_off.Seen
+        seen : diagnosis.seen.Seen
         shown : Effect or None
             What `of_record` found.
 
@@ -294,6 +301,10 @@ class Effect:
     def change_base(self, values, sampling_rate_hz):
         """The base's acceleration, shape (n,), from what is recorded of it."""
         return values
+
+    def changes_base(self):
+        """Whether `change_base` does all that this effect does, so that it is no link."""
+        return type(self).change_base is not Effect.change_base
 
     def base_gain(self, time_s):
         """Gain of the base's acceleration before the core, at times [s] since the record's start.

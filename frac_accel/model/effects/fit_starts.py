@@ -13,6 +13,8 @@ import numpy as np
 # [samples].
 _LONGEST_SEGMENT = 1024
 _MOST_DELAY = 8
+# Segments of a spectrum for low frequencies, and the coherence from which on motion is common.
+_SEGMENTS, _MOSTLY = 16, 0.5
 # Samples that must count on either side of an instant at which something is to have changed.
 _SIDE = 32
 # Share of a record at either end in which a change cannot be told from one that was always there.
@@ -139,6 +141,22 @@ def matching(view, links, count=2):
     lag = delays[np.argmax(shared, axis=1)]
     return [finite(links[i]) for i in np.argsort(plain)[:count]] + [
         finite(links[i])._replace(lag_s=float(lag[i])) for i in np.argsort(-explained)[:count]]
+
+
+def coherent_from_hz(view):
+    """Frequency [Hz] below which a record shows no common motion; 0 where it shows all of it.
+
+    Half of that above which the two signals are mostly coherent, up to the most of their power.
+    """
+    from scipy.signal import coherence, csd
+    size = max(64, len(view.measured) // _SEGMENTS)
+    simulated, measured = ((values - values[view.used].mean()) * view.used
+                           for values in (view.simulated, view.measured))
+    frequency, shared = coherence(simulated, measured, view.rate, nperseg=size)
+    top = int(np.argmax(np.abs(csd(simulated, measured, view.rate, nperseg=size)[1][1:]))) + 1
+    alone = np.flatnonzero(shared[1:top] < _MOSTLY)
+    # by one line of such a spectrum nothing is told
+    return float(frequency[alone[-1] + 1]) / 2 if len(alone) > 1 else 0.0
 
 
 def strongest_line(view):

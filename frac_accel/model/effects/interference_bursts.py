@@ -65,7 +65,7 @@ class InterferenceBursts(Effect):
         if len(error) < 10 * _WINDOW or seen.record.resampled:
             return None  # where the motion is too fast for one topic, the other's instants lack it
         noise, loud, share, better = _two_noises(error)
-        if seen.parts.get("bursts", 0.0) < _SHOWN or not 0 < share < _MOST \
+        if seen.parts().get("bursts", 0.0) < _SHOWN or not 0 < share < _MOST \
                 or loud < _LOUDER**2 * noise or better < _BETTER:
             return None
         inside = _in_bursts(error, noise, loud, share)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parameters import coefficients, parameter
 from .base import REFERENCE, Effect, Reading
+from .whole_record import filtered
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,14 +31,8 @@ class ReferenceNoise(Effect):
     share: tuple = coefficients()
 
     def change_base(self, values, sampling_rate_hz):
-        from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
-        # it begins before the motion, by as much as its frequencies are apart
-        length = next_fast_len(len(values) + int(2 * sampling_rate_hz / self.frequency_hz[1]),
-                               real=True)
-        frequency = rfftfreq(length, 1 / sampling_rate_hz)
-        share = np.interp(frequency, self.frequency_hz, self.share)
-        level = values.mean()
-        return level + irfft(share * rfft(values - level, length), length)[:len(values)]
+        return filtered(values, sampling_rate_hz, self.frequency_hz[1], lambda frequency_hz:
+                             np.interp(frequency_hz, self.frequency_hz, self.share))
 
     def unknown_density(self, frequency_hz):
         white = self.std**2 / self.frequency_hz[-1]

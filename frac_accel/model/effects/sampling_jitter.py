@@ -6,7 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import STAMPS, Effect, Reading
-from .residual_power import follows, likelihood, variance_law
+from .residual_power import follows, likelihood, slope_of, variance_law
 
 # Standard deviations by which the residual's power must follow the slope's, the logarithm of the
 # likelihood by which the slope must beat any other measure of the motion, and the share of the
@@ -44,7 +44,7 @@ class SamplingJitter(Effect):
             return None  # stamps that scatter do the same, and so do values between samples
         rate, used = seen.record.sampling_rate_hz, seen.used
         error = (seen.measured - seen.output)[used]
-        slope = _slope(seen.output)
+        slope = slope_of(seen.output)
         measures = {"slope": slope, "level": seen.output - seen.output[used].mean(),
                     "bend": np.gradient(np.gradient(seen.output))}
         squares = {name: np.square(values[used]) for name, values in measures.items()}
@@ -75,10 +75,3 @@ class SamplingJitter(Effect):
             {"rms_s": float(std / (2 * rms) / rate)}, error, after,
             f"the error's power follows the square of the slope: {share:.0%} of it, "
             f"{factor / std:.3g} standard deviations from none")
-
-
-def _slope(values):
-    """Derivative by the sample's number; central differences on four times as many points."""
-    from scipy.signal import resample_poly
-    fine = resample_poly(values, 4, 1)
-    return 4 * np.gradient(fine)[::4]

@@ -1,0 +1,104 @@
+"""A record beside the best simulation of it, and what it shows by itself."""
+
+import dataclasses
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import resample_poly
+
+from ..model.effects import known_effects
+from .leftover import rounding_errors
+
+
+@dataclasses.dataclass(frozen=True)
+class Seen:
+    """A record beside the best simulation of it, for causes that it shows by itself.
+
+    Attributes
+    ----------
+    record : Record
+    found : Integrity
+    axis : int
+        Column of the record's axis.
+    measured, output : ndarray, shape (n,)
+    rows, used : ndarray of bool, shape (n,)
+        Samples that are there, and those of them that the fit counted.
+    spikes : ndarray of bool, shape (n,)
+        Samples that it did not count since they stand far out.
+    is_coarse : bool
+        Whether the values' lattice accounts for much of what is left.
+    parts : callable
+        Gives the error budget of what is left: shares by part, where they are above zero for
+        certain.
+    """
+
+    record: object
+    found: object
+    axis: int
+    measured: np.ndarray
+    output: np.ndarray
+    rows: np.ndarray
+    used: np.ndarray
+    spikes: np.ndarray
+    is_coarse: bool
+    parts: object
+
+    def rounding(self):
+        """Errors, shape (n,), that a coarse lattice leaves of noisy simulated values."""
+        return next(rounding_errors((self.measured - self.output) * self.used, self.output,
+                                    self.used, self.found.step))
+
+    def at_stamps(self):
+        """Samples of the sensor's topic with an instant, these instants, and the simulated output
+        at the stamps that they carry."""
+        stamps = self.record.topics[1].stamps_ns
+        rate = self.record.sampling_rate_hz
+        place = (stamps - self.record.start_ns) * 1e-9 * rate
+        slot = np.round(place).astype(int)
+        good = (slot >= 0) & (slot < len(self.output))
+        fine = resample_poly(self.output, 4, 1)
+        spline = CubicSpline(np.arange(len(fine)) / 4, fine)
+        return good, slot[good], spline(np.clip(place[good] - self.record.lag_s * rate, 0,
+                                                len(self.output) - 1))
+
+    def as_recorded(self):
+        """Values before they were resampled, the simulated output at their instants, and which of
+        them lie where the fit counted samples."""
+        if "sensor" not in self.record.resampled:
+            return self.measured[self.rows], self.output[self.rows], self.used[self.rows]
+        good, slot, output = self.at_stamps()
+        there = self.rows[slot]
+        values = self.record.topics[1].values[good, self.axis]
+        return values[there], output[there], self.used[slot[there]]
+
+
+def added(engine, fitted):
+    """What a fit's residual shows by itself, sample by sample, shape (n,): no noise, and nothing
+    that the motion makes."""
+    p = engine.problem
+    total = np.zeros(len(p.record))
+    for _, _, reading in readings(engine, fitted, engine.found, {}, by_sample=True):
+        if reading.added is not None:
+            total[p.coherent] += reading.added
+    return total * p.used
+
+
+def readings(engine, fitted, found, shown, by_sample=False):
+    """(Cause, effect, `Reading`) of each that the record shows by itself, or of those only that
+    tell what they add to each sample."""
+    p = engine.problem
+    here = p.coherent
+    record = p.part(here)
+    rows = record.valid.copy()
+    rows[:64] = rows[-64:] = False
+    seen = Seen(record, found, p.axis, p.measured[here], fitted.output[here], rows,
+                rows & p.used[here], rows & p.taken(engine.spikes)[here],
+                engine.coarse_step(fitted) is not None, lambda: {
+                    entry["part"]: entry["share"] for entry in engine.budget(fitted).parts
+                    if entry["ci95"][0] > 0})
+    for cause, cls in known_effects().items():
+        if not cls.read_off or (by_sample and not cls.known_by_sample):
+            continue
+        recognised = cls.recognised(seen, shown.get(cause))
+        if recognised is not None:
+            yield cause, *recognised

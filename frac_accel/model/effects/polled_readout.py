@@ -1,0 +1,227 @@
+"""A sensor that samples by a clock of its own and is read by another one."""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from ..parameters import parameter
+from .base import STAMPS, Effect, Reading
+from .residual_power import slope_of
+
+# Longest segment [samples] in which the beat's frequency must hold, and how many there must be.
+_SEGMENT, _SEGMENTS = 1024, 8
+# Lines of such a segment that are near another one, and next to none and to the Nyquist frequency,
+# where a lag is a slow one.
+_NEAR_LINES, _SLOW_LINES = 20, 8
+# Power of the beat's line over the median of all. What is in the motion makes lines of its own:
+# shares that the slope or its square may have there of all its power, or else of that near it.
+_STANDS_OUT, _IN_MOTION, _LINE_OF_MOTION = 20.0, 0.05, 0.4
+# Standard deviations of the second harmonic from none; its size over the first one's (a half in a
+# sawtooth, less behind a filter), and the share of it that has a sawtooth's phase.
+_SIGNIFICANT, _HARMONIC, _IN_PHASE = 6.0, (0.15, 0.75), 0.8
+# Share of the error's power that it must make, and how many times what a gain with the same beat
+# would; the largest difference of the interval in two halves of equal power.
+_SHARE, _BETTER, _ALIKE = 0.05, 3.0, 0.25
+# Times that the time is halved within which the beat is followed.
+_HALVINGS = 5
+# Phases that the beat is divided into, and the share of them around the jump that is left out.
+_PHASES, _AROUND_JUMP = 32, 0.25
+# Deviations, and share, of the interval within which a rate of the sensor's clock goes with the
+# beat, and the highest one that is looked at.
+_WITHIN, _BY_FILTERS, _FASTEST = 3.0, 0.03, 1000
+
+
+@dataclasses.dataclass(frozen=True)
+class PolledReadout(Effect):
+    """The sensor samples every `interval_s` by a clock of its own; the logger reads the last value.
+
+    How old that is runs through the interval again and again, `beat_hz` times a second. A live
+    correction does not know where in the beat it is; what the age is on average is a delay.
+    """
+
+    cause = "polled_readout"
+    read_off = True
+    known_by_sample = True
+    goes_with_size = True
+    common_to_axes = True
+    stage = STAMPS
+    explanation = ("The sensor samples by a clock of its own and the logger reads its last value: "
+                   "how old that is runs through one of the sensor's intervals again and again.")
+    experiment = ("Read the sensor when it says that a new value is ready (its interrupt or its "
+                  "queue): the beat is gone.")
+
+    interval_s: float = parameter("s", minimum=0, maximum=10, null=0.0)
+    beat_hz: float = parameter("Hz", minimum=0, fixed=True)
+
+    @classmethod
+    def recognised(cls, seen, shown):
+        """The residual follows the slope by a lag that is a sawtooth of time."""
+        if seen.found.jitter_rms_s or seen.record.resampled or seen.is_coarse:
+            return None  # values between samples have no age; rounding of steady motion beats, too
+        beat = Beat.of(seen.measured - seen.output, seen.output, seen.used)
+        if beat is None:
+            return None
+        rate, own = seen.record.sampling_rate_hz, beat.own_rate
+        interval = 1 / own if own else beat.interval
+        error = (seen.measured - seen.output)[seen.used]
+        words = f"{own * rate:.5g} Hz" if own else f"some {rate / interval:.2g} Hz"
+        return cls(interval / rate, beat.frequency * rate), Reading(
+            {"interval_s": beat.std / rate}, error, error - beat.added[seen.used],
+            f"a lag that runs through {1e3 * interval / rate:.3g} ms as a sawtooth, "
+            f"{beat.frequency * rate:.4g} times a second, makes {beat.share:.0%} of the error: the "
+            f"sensor samples at {words}", added=beat.added)
+
+
+class Beat(NamedTuple):
+    """A lag that is a sawtooth of time, in what a simulation leaves; in sampling intervals.
+
+    Attributes
+    ----------
+    frequency : float
+    interval, std : float
+        The sawtooth's height, and its standard uncertainty.
+    own_rate : float or None
+        Samples of the sensor's own clock in each of the record's, where one goes with the beat.
+    share : float
+        Of the error's power.
+    added : ndarray, shape (n,)
+        What it adds to the output.
+    """
+
+    frequency: float
+    interval: float
+    std: float
+    own_rate: float | None
+    share: float
+    added: np.ndarray
+
+    @classmethod
+    def of(cls, error, output, used):
+        """The beat in an error, or None; arrays of shape (n,)."""
+        size = min(_SEGMENT, len(error) // _SEGMENTS)
+        if size < 8 * _SLOW_LINES:
+            return None
+        slope = slope_of(output) * used
+        level = (output - output[used].mean()) * used
+        total = float(np.sum((error * used)**2))
+        error = _without_slow(error * used, slope, level, size)
+        shared, power = error * slope, slope**2
+        line = _line(shared, slope, size)
+        if line is None:
+            return None
+        frequency = line / size
+        phase = _tracked(shared, frequency, size)
+        first, second = _harmonics(shared, phase)
+        std = np.sqrt(np.sum(shared**2))
+        ratio = abs(second) / max(abs(first), 1e-300)
+        if abs(second) < _SIGNIFICANT * std or not _HARMONIC[0] < ratio < _HARMONIC[1] \
+                or second.imag**2 < _IN_PHASE * abs(second)**2:
+            return None
+        middle = int(np.searchsorted(np.cumsum(power), power.sum() / 2))
+        # rising where the second harmonic is a sine of the same sign as the first one's cosine
+        rising = second.imag < 0
+        heights = [_height(shared[half], power[half], phase[half], rising)[0]
+                   for half in (slice(middle), slice(middle, None))]
+        height, height_std = _height(shared, power, phase, rising)
+        if height <= 0 or abs(heights[1] - heights[0]) > _ALIKE * height:
+            return None
+        added = _folded(shared, power, phase) * slope
+        explained = _explained(error, added)
+        if explained < _SHARE * total or explained < _BETTER * _explained(
+                error, _folded(error * level, level**2, phase) * level):
+            return None
+        beat = float(np.diff(np.unwrap(phase)).mean() / (2 * np.pi))
+        rates = _own_rates(beat, height, height_std, rising)
+        return cls(beat, height, height_std, float(rates[0]) if len(rates) == 1 else None,
+                   explained / total, added) if len(rates) else None
+
+
+def _line(shared, slope, size):
+    """Line of a segment's spectrum where a lag beats that the motion does not have, or None."""
+    powers = [np.mean(np.abs(np.fft.rfft(_segments(values, size)))**2, axis=0)
+              for values in (shared, slope, slope**2)]
+    inner = slice(_SLOW_LINES, -_SLOW_LINES)
+    line = _SLOW_LINES + int(np.argmax(powers[0][inner]))
+    if powers[0][line] < _STANDS_OUT * np.median(powers[0][inner]) \
+            or any(_has_line(power, line) for power in powers[1:]):
+        return None
+    return line
+
+
+def _has_line(power, line):
+    there = power[line - 2:line + 3].sum()
+    near = power[max(line - _NEAR_LINES, 0):line + _NEAR_LINES + 1].sum()
+    return there > max(_IN_MOTION * power.sum(), _LINE_OF_MOTION * near)
+
+
+def _without_slow(error, slope, level, size):
+    """An error without the lag and the gain that it has over some time: no beat."""
+    from scipy.signal import fftconvolve
+    window = np.hanning(size // 2)
+
+    def around(values):
+        return fftconvolve(values, window, "same")
+    both, bottom = around(slope * level), 1e-9 * np.mean(level**2) * window.sum() + 1e-300
+    slopes, levels = (np.maximum(around(values**2), bottom) for values in (slope, level))
+    shared, own = around(error * slope), around(error * level)
+    determinant = np.maximum(slopes * levels - both**2, 1e-6 * slopes * levels)
+    return error - ((levels * shared - both * own) * slope
+                    + (slopes * own - both * shared) * level) / determinant
+
+
+def _segments(values, size):
+    count = 2 * (len(values) // size) - 1
+    rows = size // 2 * np.arange(count)[:, None] + np.arange(size)
+    return np.hanning(size) * values[rows]
+
+
+def _tracked(shared, frequency, size):
+    """Phase [rad] of the beat, which wanders, shape (n,): that of a cosine."""
+    from scipy.signal import fftconvolve
+    even = 2 * np.pi * frequency * np.arange(len(shared))
+    turned = shared * np.exp(-1j * even)
+    phases = (even + np.angle(fftconvolve(turned, np.hanning(size >> halved), "same"))
+              for halved in range(_HALVINGS))
+    # the second harmonic, which nothing follows, shows how well the first is followed
+    return max(phases, key=lambda phase: abs(_harmonics(shared, phase)[1]))
+
+
+def _harmonics(shared, phase):
+    return [np.sum(shared * np.exp(-1j * k * phase)) for k in (1, 2)]
+
+
+def _places(phase):
+    return np.floor(phase / (2 * np.pi) * _PHASES).astype(int) % _PHASES
+
+
+def _folded(shared, power, phase):
+    """Factor by phase, of each sample, shape (n,), that takes most of the error."""
+    place = _places(phase)
+    sums = [np.bincount(place, values, _PHASES) for values in (shared, power)]
+    return (sums[0] / np.maximum(sums[1], 1e-300))[place]
+
+
+def _height(shared, power, phase, rising):
+    """Height of the sawtooth, and its standard uncertainty, by its slope away from its jump."""
+    # a rising sawtooth whose first harmonic is a cosine is zero a quarter before its crest
+    turn = (phase / (2 * np.pi) + (0.25 if rising else -0.25) + 0.5) % 1 - 0.5
+    kept = abs(turn) < 0.5 - _AROUND_JUMP / 2
+    weight = np.where(kept, power, 0.0)
+    total = max(weight.sum(), 1e-300)
+    centre = weight @ turn / total
+    spread = max(weight @ (turn - centre)**2, 1e-300)
+    height = np.sum((shared * (turn - centre))[kept]) / spread
+    std = np.sqrt(np.sum((shared * (turn - centre))[kept]**2)) / spread
+    return float(height if rising else -height), float(std)
+
+
+def _explained(error, added):
+    return float(np.sum(2 * error * added - added**2))
+
+
+def _own_rates(beat, interval, std, rising):
+    """Rates of the sensor's clock, in samples of the record, that go with a beat: whole ones and
+    the beat."""
+    rates = np.arange(1, _FASTEST) + (-beat if rising else beat)
+    return rates[abs(1 / rates - interval) < _WITHIN * std + _BY_FILTERS * interval]
