@@ -142,7 +142,8 @@ class Engine:
             rows = p.strongest(LONG // 2)
             self.part = Engine(p.part(rows), p.axis, p.baseline, p.taken(self.wanted)[rows],
                                self.search.base, self.search.candidates, self.search.stages,
-                               self._step, p.limit, self.passed_on, self.loose, p.in_own_core)
+                               self._step, p.limit.of_part(), self.passed_on, self.loose,
+                               p.in_own_core)
             self.part.identified, self.part.found = self.identified, self.found
             return self.part.run(seed)
         self.best = self.compete(self.search.run(self.threshold, self.promises, self.noise_only,

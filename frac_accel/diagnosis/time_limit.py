@@ -1,11 +1,13 @@
 """Budget of processor time: a search that has used it up says what it left out."""
 
+import copy
 import time
 
 from ..simulation.compiling import compiled_s
 
-# Share of the budget after which nothing new is tried, so that what is known can be judged.
-_SEARCH = 0.75
+# Share of the budget after which nothing new is tried, so that what is known can be judged; and in
+# a part of a long record, the whole of which has to be fitted, too.
+_SEARCH, _SEARCH_IN_PART = 0.75, 0.4
 
 
 class TimeLimit:
@@ -26,6 +28,13 @@ class TimeLimit:
         self.seconds = seconds
         self._start = time.process_time() - compiled_s()
         self.left_out = []
+        self._search = _SEARCH
+
+    def of_part(self):
+        """The same budget for the search in a part of a long record."""
+        limit = copy.copy(self)
+        limit._search = _SEARCH_IN_PART
+        return limit
 
     def spent_s(self):
         """Processor time [s] since the start."""
@@ -33,7 +42,7 @@ class TimeLimit:
 
     def ends_search(self, words=None):
         """Whether the search must end; notes what is left out because of it."""
-        return self._over(_SEARCH, words)
+        return self._over(self._search, words)
 
     def ends_judging(self, words=None):
         """Whether nothing that can be spared is done any more."""
