@@ -257,7 +257,9 @@ class _Problem:
         """Most promising starting points: the grid's best, improved on the averaged response."""
         bulk = bulk_delay(self.reference, self.whole)
         frequency, response, weight = averaged_response(self.reference, self.whole, self.rate, bulk)
-        if not len(frequency):
+        # of the power of a signal next to zero, or without bound, nothing is left either
+        energy = weight * np.abs(response)**2
+        if not 0 < np.sum(energy * frequency) < np.inf:
             raise IdentificationError("no frequency is left at which the record says how the "
                                       "sensor responds")
         s = 2j * np.pi * frequency
@@ -266,7 +268,6 @@ class _Problem:
         grid = self.structure.grid(frequency[0], frequency[-1], peak)
         models = self.structure.response(prepared, grid.T[:, :, None])
         # the correlation may have peaked half a period of the resonance away from the delay
-        energy = weight * np.abs(response)**2
         reach = 0.75 * self.rate * np.sum(energy) / np.sum(energy * frequency) + 2
         step = max(0.25, self.rate / (8 * frequency[-1]), reach / 100)
         delays = np.arange(-reach, reach + step, step)
