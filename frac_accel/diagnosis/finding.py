@@ -44,8 +44,11 @@ class Finding:
             field.name: {"value": float(getattr(self.effect, field.name)),
                          "std": float(self.std[field.name]), "unit": field.metadata["unit"]}
             for field in parameter_fields(type(self.effect)) if field.name in self.std}
-        parameters.update({name: {"value": value, "std": 0.0, "unit": ""}
-                           for name, value in fixed_values(self.effect).items()})
+        units = {field.name: field.metadata["unit"] for field in parameter_fields(type(self.effect))
+                 if field.metadata.get("fixed")}
+        parameters.update({name: {"value": value, "std": 0.0, "unit": units.get(name, "")}
+                           for name, value in fixed_values(self.effect).items()
+                           if name not in self.std})
         return {"cause": self.cause, "parameters": parameters, "confidence": self.confidence,
                 "confusable_with": self.confusable_with, "evidence": self.evidence,
                 "explanation": self.effect.explanation, "gain": self.gain.as_dict()}

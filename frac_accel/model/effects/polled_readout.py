@@ -67,7 +67,8 @@ class PolledReadout(Effect):
         error = (seen.measured - seen.output)[seen.used]
         words = f"{own * rate:.5g} Hz" if own else f"some {rate / interval:.2g} Hz"
         return cls(interval / rate, beat.frequency * rate), Reading(
-            {"interval_s": beat.std / rate}, error, error - beat.added[seen.used],
+            {"interval_s": beat.std / rate, "beat_hz": beat.frequency_std * rate},
+            error, error - beat.added[seen.used],
             f"a lag that runs through {1e3 * interval / rate:.3g} ms as a sawtooth, "
             f"{beat.frequency * rate:.4g} times a second, makes {beat.share:.0%} of the error: the "
             f"sensor samples at {words}", added=beat.added)
@@ -78,7 +79,8 @@ class Beat(NamedTuple):
 
     Attributes
     ----------
-    frequency : float
+    frequency, frequency_std : float
+        Its mean, and the standard uncertainty by which it wanders.
     interval, std : float
         The sawtooth's height, and its standard uncertainty.
     own_rate : float or None
@@ -90,6 +92,7 @@ class Beat(NamedTuple):
     """
 
     frequency: float
+    frequency_std: float
     interval: float
     std: float
     own_rate: float | None
@@ -131,9 +134,11 @@ class Beat(NamedTuple):
         if explained < _SHARE * total or explained < _BETTER * _explained(
                 error, _folded(error * level, level**2, phase) * level):
             return None
-        beat = float(np.diff(np.unwrap(phase)).mean() / (2 * np.pi))
+        turned = np.unwrap(phase)[::size] / (2 * np.pi)
+        beat = float((turned[-1] - turned[0]) / (size * (len(turned) - 1)))
+        wanders = float(np.std(np.diff(turned) / size) / np.sqrt(len(turned) - 1))
         rates = _own_rates(beat, height, height_std, rising)
-        return cls(beat, height, height_std, float(rates[0]) if len(rates) == 1 else None,
+        return cls(beat, wanders, height, height_std, float(rates[0]) if len(rates) == 1 else None,
                    explained / total, added) if len(rates) else None
 
 
