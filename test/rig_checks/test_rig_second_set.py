@@ -124,36 +124,34 @@ def test_time_step_reads_the_sine_earlier_from_then_on():
         assert relative_rms(record.sensor[:, 0] - exact, exact) < 1e-9
 
 
-def test_sampling_jitter_moves_the_instants_of_all_axes_together():
+def steep_lags(effects):
+    """Record of a steady sine with something wrong with its instants; by how much they are, where
+    the sine is steep."""
     excitation = steady_sine(37.0)
-    sensor = flat({"sampling_jitter": {"rms_s": 4e-4}})
-    record = rig.simulate_record(sensor, excitation, np.random.default_rng(2), noise_std=0)
+    record = rig.simulate_record(flat(effects), excitation, np.random.default_rng(2), noise_std=0)
     t = times(excitation)
     slope = 2 * np.pi * 37.0 * np.cos(2 * np.pi * 37.0 * t + 0.3)
     steep = np.abs(slope) > 0.7 * slope.max()
     # exact inverse of the sine on its branch
     value = np.clip(record.sensor[:, 0], -1, 1)
     branch = np.where(slope > 0, np.arcsin(value), np.pi - np.arcsin(value))
-    scatter = np.angle(np.exp(1j * (branch - 2 * np.pi * 37.0 * t - 0.3))) / (2 * np.pi * 37.0)
-    assert abs(scatter[steep].std() / 4e-4 - 1) < 0.06
-    assert abs(scatter[steep].mean()) < 5e-5
+    lags = np.angle(np.exp(1j * (branch - 2 * np.pi * 37.0 * t - 0.3))) / (2 * np.pi * 37.0)
+    return record, lags[steep]
+
+
+def test_sampling_jitter_moves_the_instants_of_all_axes_together():
+    record, scatter = steep_lags({"sampling_jitter": {"rms_s": 4e-4}})
+    assert abs(scatter.std() / 4e-4 - 1) < 0.06
+    assert abs(scatter.mean()) < 5e-5
     assert np.array_equal(record.sensor[:, 0], record.sensor[:, 1])
     assert np.array_equal(record.stamps_ns, record.sensor_stamps_ns)
     assert np.allclose(record.clean, record.reference, atol=1e-9)
 
 
 def test_a_polled_value_is_up_to_one_interval_old():
-    excitation = steady_sine(37.0)
-    sensor = flat({"polled_readout": {"interval_s": 4.3e-4}})
-    record = rig.simulate_record(sensor, excitation, np.random.default_rng(2), noise_std=0)
-    t = times(excitation)
-    slope = 2 * np.pi * 37.0 * np.cos(2 * np.pi * 37.0 * t + 0.3)
-    steep = np.abs(slope) > 0.7 * slope.max()
-    value = np.clip(record.sensor[:, 0], -1, 1)
-    branch = np.where(slope > 0, np.arcsin(value), np.pi - np.arcsin(value))
-    lag = np.angle(np.exp(1j * (branch - 2 * np.pi * 37.0 * t - 0.3)))[steep] / (2 * np.pi * 37.0)
+    record, lags = steep_lags({"polled_readout": {"interval_s": 4.3e-4}})
     # as often at any age
-    assert np.allclose(np.quantile(lag, [0.005, 0.5, 0.995]), 4.3e-4 * np.array(
+    assert np.allclose(np.quantile(lags, [0.005, 0.5, 0.995]), 4.3e-4 * np.array(
         [-0.495, 0, 0.495]), atol=2e-5)
     assert np.allclose(record.clean, record.reference, atol=1e-9)
 

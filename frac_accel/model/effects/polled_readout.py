@@ -59,16 +59,16 @@ class PolledReadout(Effect):
         """The residual follows the slope by a lag that is a sawtooth of time."""
         if seen.found.jitter_rms_s or seen.record.resampled or seen.is_coarse:
             return None  # values between samples have no age; rounding of steady motion beats, too
-        beat = Beat.of(seen.measured - seen.output, seen.output, seen.used)
+        error = seen.measured - seen.output
+        beat = Beat.of(error, seen.output, seen.used)
         if beat is None:
             return None
         rate, own = seen.record.sampling_rate_hz, beat.own_rate
         interval = 1 / own if own else beat.interval
-        error = (seen.measured - seen.output)[seen.used]
         words = f"{own * rate:.5g} Hz" if own else f"some {rate / interval:.2g} Hz"
         return cls(interval / rate, beat.frequency * rate), Reading(
             {"interval_s": beat.std / rate, "beat_hz": beat.frequency_std * rate},
-            error, error - beat.added[seen.used],
+            error[seen.used], (error - beat.added)[seen.used],
             f"a lag that runs through {1e3 * interval / rate:.3g} ms as a sawtooth, "
             f"{beat.frequency * rate:.4g} times a second, makes {beat.share:.0%} of the error: the "
             f"sensor samples at {words}", added=beat.added)
