@@ -4,9 +4,10 @@ import dataclasses
 import functools
 
 import numpy as np
-from scipy.fft import rfft
+from scipy.fft import irfft, rfft
 
 from ..identification.response.recognise import recognise
+from ..record.resampling import BAND
 from . import repeats, shapes, unrelated
 from .blocks import FOLDS, Blocks, intervals
 from .filters import Filters
@@ -312,7 +313,7 @@ class _One:
             if part in self.chosen and name != self.chosen[part]:
                 continue
             predicted = np.where(judged, make(), 0.0)
-            gains = self.r.blocks.sums((2 * target - predicted) * predicted)
+            gains = self._gains(part, target, predicted)
             if first is None:
                 first = name, predicted, size
             more = gains - best_gain
@@ -330,6 +331,20 @@ class _One:
             self.chosen[part] = (best or first)[0]
         _, estimate, self.sizes[part] = best or first
         return (estimate if best else np.zeros(self.r.n)), estimate
+
+    def _gains(self, part, target, predicted):
+        """Power that a prediction takes of each block; of shapes, of what neither a slow course nor
+        folding at the Nyquist frequency would make as well."""
+        if part in ("even", "odd"):
+            target, predicted = (self._shaped(values) for values in (target, predicted))
+        return self.r.blocks.sums((2 * target - predicted) * predicted)
+
+    def _shaped(self, values):
+        """Values without what is slower than the motion, or where faster motion may fold."""
+        lines = rfft(values)
+        lines[:int(self.r.lowest * self.r.n)] = 0.0
+        lines[int(BAND * self.r.n):] = 0.0
+        return irfft(lines, self.r.n)
 
     def _candidates(self, part, target):
         """Names, numbers of coefficients and makers of predictions of one part, the simplest ones
@@ -469,7 +484,7 @@ class _One:
                 names.append(name)
                 products.append(reductions[-1] + self._error(alone, piece, self.sizes[part]))
                 spectra[name + str(len(names))] = target, piece
-            left -= np.where(counted, self.predicted[part], 0.0)
+            left = left - np.where(counted, self.predicted[part], 0.0)
         if self.other is not None:
             other = np.where(counted, self.other - np.mean(self.other[counted]), 0.0)
             names.append("reference")

@@ -29,6 +29,11 @@ _FLOOR, _SCATTERS = 0.05, 1.3
 # must have none, ratio of the densities there, and times what motion of that density would show in
 # the sensor (power) that it may have: such motion would make the coherence at least 1/3.
 _SHARED, _WIDE, _EVEN, _LOUDEST = 0.2, 0.15, 2.0, 2.0
+# An excess: lines of the spectrum, and coherence from which one counts; standard deviations by
+# which it must stand out, squares of such deviations that it may leave a line, those that any
+# filter must leave more, and rounds in which the deviations become known.
+_LINES_SHARED, _COHERENT = 12, 0.3
+_STANDS_OUT, _SCATTER, _NO_FILTER, _PASSES = 12.0, 1.2, 30.0, 4
 # Share of the floor that the median of the segments must have.
 _STEADY = 0.5
 # Relative uncertainty at least: no noise is white to better than that.
@@ -49,7 +54,7 @@ class ReferenceNoise:
         Standard deviation [m/s²].
     uncertainty : float
         Its standard uncertainty [m/s²].
-    by : {"periods", "rest", "covariance", "floor"}
+    by : {"periods", "rest", "covariance", "floor", "excess"}
     bends : bool
         Whether it is enough to bend a fit; else it counts as noise only.
     frequency_hz, share : tuple of float
@@ -71,7 +76,8 @@ class ReferenceNoise:
         """Sentence without a full stop."""
         how = {"periods": "by what differs between its repeated periods",
                "rest": "where both stand still", "covariance": "as its messages state",
-               "floor": "by what it has, evenly, at frequencies where the sensor has none of it"}
+               "floor": "by what it has, evenly, at frequencies where the sensor has none of it",
+               "excess": "by what it has, evenly, beyond the motion that the sensor shows"}
         return (f"the reference's own noise is {self.std:.3g} m/s^2 RMS, {how[self.by]}: it counts "
                 "behind a filter that leaves as little of it as possible")
 
@@ -80,7 +86,7 @@ class ReferenceNoise:
         return self.std**2 / self.frequency_hz[-1] * (frequency_hz <= self.band_hz)
 
 
-def reference_noise(record, column, used, covariance_std=None):
+def reference_noise(record, column, used, covariance_std=None, transfer_function=None):
     """`ReferenceNoise` of an axis of a record, or None where it shows none that matters.
 
     Parameters
@@ -91,6 +97,8 @@ def reference_noise(record, column, used, covariance_std=None):
         Samples that count.
     covariance_std : float, optional
         What the reference's messages state [m/s²].
+    transfer_function : callable, optional
+        Of the model in use, from complex frequencies [rad/s]; a constant without it.
     """
     rate, moved = record.sampling_rate_hz, "reference" in record.resampled
     own_rate = record.topics[0].clock.rate_hz if moved else rate
@@ -103,20 +111,26 @@ def reference_noise(record, column, used, covariance_std=None):
     inner = _inner(frequency, record)
     power = float(np.var(one))
     most = np.quantile(own[inner], _FLOOR)
-    for density, by in _estimates(record, column, used, covariance_std, own_rate, most, size):
+    for density, by in _estimates(record, column, used, covariance_std, own_rate, most, size,
+                                  transfer_function):
         std = np.sqrt(density * own_rate / 2)
-        if density <= _SCATTERS**2 * most and density * rate / 2 / power < _MOST:
+        bends = density * rate / 2 / power > _LEAST
+        # an excess that bends nothing may be some other small thing
+        if density <= _SCATTERS**2 * most and density * rate / 2 / power < _MOST \
+                and (bends or by != "excess"):
             share = np.clip(1 - density / own, 0.0, 1.0)
             # a constant is no noise, and the first line holds what the window leaves of it
             share[:2] = 1.0, share[2]
             # nothing is compared beyond the band
             share[inner.stop:] = 0.0
-            count = {"covariance": np.inf, "floor": _WIDE * len(one)}.get(by, len(one) / 4)
+            # of an excess that just stands out: as little is known of it
+            count = {"covariance": np.inf, "floor": _WIDE * len(one),
+                     "excess": _STANDS_OUT**2 / 2}.get(by, len(one) / 4)
             known = max(1 / np.sqrt(2 * count), _AS_WHITE)
             # as far as its own Nyquist frequency
             ends = (frequency[-1], own_rate / 2) if own_rate > rate else (own_rate / 2,)
             return ReferenceNoise(
-                float(std), float(known * std), by, bool(density * rate / 2 / power > _LEAST),
+                float(std), float(known * std), by, bool(bends),
                 (*frequency[frequency < ends[0]].tolist(), *ends),
                 (*share[frequency < ends[0]].tolist(), *[float(share[-1])] * len(ends)),
                 record.band_hz or np.inf)
@@ -128,7 +142,7 @@ def _inner(frequency, record):
     return slice(2, min(np.searchsorted(frequency, record.band_hz or np.inf), len(frequency) - 1))
 
 
-def _estimates(record, column, used, covariance_std, own_rate, most, size):
+def _estimates(record, column, used, covariance_std, own_rate, most, size, transfer_function):
     """Pairs of a density [(m/s²)²/Hz] and what shows it, the best first.
 
     `own_rate` [Hz] is that at which the reference was sampled, `most` its lowest density.
@@ -143,9 +157,10 @@ def _estimates(record, column, used, covariance_std, own_rate, most, size):
     if _given(covariance_std) and not _untrusted(covariance_std, None,
                                                  _SCATTERS * np.sqrt(most * own_rate / 2)):
         yield 2 * covariance_std**2 / own_rate, "covariance"
-    density = _floor(one, two, record, size)
-    if density is not None:
-        yield density, "floor"
+    for find, by in (_floor, "floor"), (_excess, "excess"):
+        density = find(one, two, record, size, transfer_function)
+        if density is not None:
+            yield density, by
 
 
 def _at_rest(one, two, used, rate):
@@ -166,8 +181,8 @@ def _at_rest(one, two, used, rate):
     return float(np.sqrt(np.mean(parts[0][quiet]**2))) if shared < _SHARED**2 else None
 
 
-def _floor(one, two, record, size):
-    """An even density of the reference that the sensor lacks, or None."""
+def _floor(one, two, record, size, transfer_function):
+    """An even density of the reference at frequencies where the sensor has none of it, or None."""
     rate = record.sampling_rate_hz
     frequency, own = welch(one, rate, nperseg=size)
     other, shared = welch(two, rate, nperseg=size)[1], csd(one, two, rate, nperseg=size)[1]
@@ -187,3 +202,47 @@ def _floor(one, two, record, size):
     if high > _EVEN * low or np.median(other[apart]) > _LOUDEST * gain**2 * density:
         return None
     return float(density)
+
+
+def _excess(one, two, record, size, transfer_function):
+    r"""An even density of the reference beyond the motion that the sensor shows, or None.
+
+    With the motion's density :math:`S_{aa}`, noise of density N on the reference, and the model's
+    response H up to a gain g, :math:`S_{rr} = S_{aa} + N` and :math:`|S_{rs}| = g |H| S_{aa}`: a
+    straight line with the intercept N. A filter that the model lacks bends it in proportion to the
+    motion, smoothly over the frequency: where the motion's spectrum is smooth, too, nothing tells
+    one from the other, and there is no answer (J. S. Bendat, A. G. Piersol, *Random Data*, 4th ed.
+    (2010), chapter 6).
+    """
+    rate = record.sampling_rate_hz
+    frequency, own = welch(one, rate, nperseg=size)
+    other, shared = welch(two, rate, nperseg=size)[1], np.abs(csd(one, two, rate, nperseg=size)[1])
+    # half of the overlapping segments' pairs are independent values of a real part
+    count = 3 * len(one) / size
+    rows = np.zeros(len(frequency), bool)
+    rows[_inner(frequency, record)] = True
+    rows &= shared**2 > _COHERENT * own * other
+    if rows.sum() < _LINES_SHARED:
+        return None
+    frequency, own, other, shared = frequency[rows], own[rows], other[rows], shared[rows]
+    response = np.ones(len(frequency)) if transfer_function is None \
+        else np.abs(transfer_function(2j * np.pi * frequency))
+    # chance makes a coherence, too
+    motion = np.sqrt(np.maximum(shared**2 - 2 * own * other / count, 0.0)) / response
+    slope = np.median(own / np.maximum(motion, 1e-300))
+
+    def line(*columns):
+        """Coefficients, squares that are left, and standard deviations."""
+        weight = np.sqrt(count / (own * apart))
+        matrix = np.stack(columns, axis=1) * weight[:, None]
+        found = np.linalg.lstsq(matrix, own * weight, rcond=None)[0]
+        left = np.sum((own * weight - matrix @ found)**2)
+        return found, left, np.sqrt(np.diag(np.linalg.pinv(matrix.T @ matrix)))
+    for _ in range(_PASSES):
+        # density of what both have by themselves
+        apart = np.maximum(own + slope**2 * other / response**2 - 2 * slope * motion, 1e-6 * own)
+        (slope, density), left, (_, std) = line(motion, np.ones(len(motion)))
+    bends = [motion * (frequency / frequency[-1])**power for power in (-2.0, 1.0, 2.0, 4.0)]
+    filters = [line(motion, *bends[:k], *bends[k + 1:])[1] for k in range(4)]
+    return float(density) if density > _STANDS_OUT * std and left < _SCATTER * len(motion) \
+        and left + _NO_FILTER < min(filters) else None

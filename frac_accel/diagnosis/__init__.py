@@ -116,7 +116,8 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     moving, notes = moving_samples(record, column)
     found.words.extend(notes)
     used = record.valid & moving
-    noise = reference_noise(record, column, used, _stated_noise(source[0], column))
+    noise = reference_noise(record, column, used, _stated_noise(source[0], column),
+                            model and model.axis(axis).transfer_function)
     if noise and noise.bends:
         found = dataclasses.replace(found, reference_noise=noise, words=[*found.words, noise.words])
     shown, used, stray, at_limit = _shown(found, record, column, used)

@@ -3,11 +3,12 @@
 import dataclasses
 
 import numpy as np
-from scipy.fft import rfft
+from scipy.fft import irfft, rfft
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import nnls
 
 from ..model.effects.fit_starts import bulk_shift
+from ..record.resampling import BAND
 
 _SEGMENTS = 48
 _SHIFTS = 40
@@ -124,12 +125,22 @@ def rounding_errors(residual, simulated, used, step):
 def _leftover(residual, simulated, used, across):
     rng = np.random.default_rng(0)
     rms = float(np.sqrt(np.mean(residual[used]**2)))
+    below = _below_folding(residual) * used
+    kept = float(np.mean(below[used]**2)) / max(rms, 1e-300)**2
     linear, linear_score = max((_linear(residual, signal, rng) for signal in
                                 (simulated, *across)), key=lambda pair: pair[1])
-    level, level_score = max(_level(residual, simulated, used, rng),
-                             _quiet(residual, simulated, used), key=lambda pair: pair[0]
+    level, level_score = max(_level(below, simulated, used, rng),
+                             _quiet(below, simulated, used), key=lambda pair: pair[0]
                              * (pair[1] > _SIGNIFICANT))
-    return Leftover(rms, linear, level, linear_score, level_score)
+    return Leftover(rms, linear, kept * level, linear_score, level_score)
+
+
+def _below_folding(values):
+    """Values up to where motion above the Nyquist frequency may fold: what does there comes and
+    goes with the motion, too, and no model of the sensor says it."""
+    lines = rfft(values)
+    lines[int(BAND * len(values)):] = 0.0
+    return irfft(lines, len(values))
 
 
 def related(measured, simulated, used):
@@ -164,6 +175,8 @@ def _linear(residual, simulated, rng):
             for v in (simulated, residual))
     own = np.sum(np.abs(x)**2, axis=0)
     strong = own > 1e-6 * own.max()
+    kept = strong & (np.arange(len(own)) < BAND * size)
+    strong = kept if kept.any() else strong
     x, r, own = x[:, strong], r[:, strong], own[strong]
 
     def explained(x):

@@ -11,8 +11,11 @@ from .kept import kept
 _DAMPING = np.log(1e8)
 # Records in one period of the transform, so that nothing wraps around.
 _PERIOD = 2
-# Share of the frequencies, the highest, over which a response is turned to be real at the last.
-_TURNED = 0.2
+# Shares of the frequencies, the highest, over which a response may be turned to be real at the
+# last; and the error, over the input, that this leaves in the middle of a record, times the share's
+# square: measured on 3000 samples of noise that ends below it, delayed by a third of a sample.
+_TURNED = 0.2, 0.1, 0.05, 0.02, 0.01
+_RINGS = 1.2e-8
 # Undamping factors that are kept.
 _UNDAMPINGS = 4
 _LAGRANGE_POINTS = 8
@@ -52,7 +55,7 @@ class Convolution:
         self._s /= self._length
         self._s += self._sigma
         self._s *= rate
-        ramp = np.linspace(0, 1, len(self._s) - int((1 - _TURNED) * len(self._s)))
+        ramp = np.linspace(0, 1, len(self._s) - int((1 - _turned(values)) * len(self._s)))
         self._ramp = ramp * ramp * (3 - 2 * ramp)
 
     @property
@@ -83,9 +86,9 @@ class Convolution:
     def _smooth_at_nyquist(self, spectrum, last):
         """Turn the phase so that `last`, the response at the Nyquist frequency, becomes real.
 
-        In place, by a turn that grows over the last fifth below that frequency. Anything else
-        there jumps to its conjugate, and the jump rings through the record from both its ends with
-        an amplitude that falls only as 1/n.
+        In place, by a turn that grows over the last frequencies below that one (`_turned`).
+        Anything else there jumps to its conjugate, and the jump rings through the record from both
+        its ends with an amplitude that falls only as 1/n.
         """
         angle = np.angle(last)
         turn = (angle - np.round(angle / np.pi) * np.pi) * self._ramp
@@ -125,6 +128,20 @@ def at_positions(values, position):
                 weight *= (place - j) / (i - j)
         result += weight * values[first + i]
     return result
+
+
+def _turned(values):
+    """Share of the frequencies, the highest, over which responses to an input are turned.
+
+    Where it has power, its response is a wrong one; the fewer they are, the farther it rings.
+    """
+    power = np.square(np.abs(rfft((values - np.mean(values)) * np.hanning(len(values)))))
+    above = np.cumsum(power[::-1])
+
+    def error(share):
+        return np.sqrt(above[int(share * (len(power) - 1))] / max(above[-1], 1e-300)) \
+            + _RINGS / share**2
+    return min(_TURNED, key=error)
 
 
 def _fast_length(n):

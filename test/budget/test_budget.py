@@ -132,7 +132,41 @@ def test_pictures_add_up():
     found = budget(*signals)
     for parts in (found.in_bands, found.along):
         assert sum(values.sum() for values in parts.values()) == pytest.approx(1, abs=1e-6)
+        for part in ("linear", "lines", "bursts"):
+            assert parts[part].sum() == pytest.approx(found.share(part), abs=0.05)
     assert np.diff(found.band_edges_hz).min() > 0 and found.band_edges_hz[-1] == RATE / 2
+
+
+def test_a_drift_beside_a_sweep_is_no_distortion():
+    """The sweep's level has a course in time, and a shape of it may have the drift's."""
+    rng = np.random.default_rng(4)
+    n = 12_000
+    t = np.arange(n) / n
+    y = (0.2 + t) * np.sin(2 * np.pi * n * (0.02 * t + 0.09 * t**2))
+    drift = 0.02 * (t - 0.5)
+    rest = drift - drift.mean() + 0.002 * rng.normal(size=n)
+    found = budget(rest, y + rest, y, np.c_[y, 0 * y, 0 * y])
+    assert found.share("even") < 0.02
+    assert covered(found, "slow", np.mean((drift - drift.mean())**2) / np.mean(rest**2))
+
+
+def test_motion_that_folds_is_no_distortion():
+    """Harmonics of a gait above the Nyquist frequency come back below it, as those of its square
+    do."""
+    rng = np.random.default_rng(5)
+    n, fine, rate = 6000, 8, 50.0
+    phase = np.cumsum(1.8 / rate / fine * (1 + 0.1 * sig.lfilter(
+        [1e-3], [1, -0.999], rng.normal(size=n * fine))))
+    steps = np.mod(phase, 1.0)
+    motion = sig.sosfilt(sig.butter(8, 19 / rate / fine * 2, output="sos"),
+                         np.exp(-steps / 0.02) - 0.6 * np.exp(-steps / 0.05))
+    lines = np.fft.rfft(motion)
+    lines[np.fft.rfftfreq(n * fine, 1 / rate / fine) > rate / 2] = 0.0
+    clean = np.fft.irfft(lines, n * fine)[::fine]
+    rest = motion[::fine] - clean
+    rest = rest + 0.05 * rest.std() * rng.normal(size=n)
+    found = budget(rest, clean + rest, clean, np.c_[clean, 0 * clean, 0 * clean])
+    assert found.share("even") + found.share("odd") < 0.1
 
 
 @pytest.mark.parametrize("n", [32, 50, 200])

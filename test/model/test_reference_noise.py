@@ -101,3 +101,43 @@ def test_named_and_nothing_else_and_validated(with_model):
     left, more = (validate(bag, one).simulation.total.nrmse for one in (model, without))
     assert left == pytest.approx(found.extended["nrmse"], rel=0.1)
     assert left < more
+
+
+def coloured(seed, low_pass_hz=None):
+    """Motion with resonances that fills the band, at 200 Hz; the reference with noise 20 to 34 dB
+    below it, and a sensor that is late, or slow instead of a noisy reference."""
+    rng = np.random.default_rng(seed)
+    n, rate = 16_000, 200.0
+    frequency = np.fft.rfftfreq(n, 1 / rate)
+    lines = np.fft.rfft(rng.standard_normal(n)) * (1 + (frequency / rng.uniform(3, 10))**2)**2
+    for resonance in rng.uniform(3, 90, 4):
+        lines = lines / (1 - (frequency / resonance)**2 + 0.1j * frequency / resonance)
+    late = np.exp(-2j * np.pi * frequency * rng.uniform(0, 0.01))
+    if low_pass_hz:
+        late = late / (1 + 1j * frequency / low_pass_hz)
+    motion, output = np.fft.irfft(lines, n), np.fft.irfft(lines * late, n)
+    scale = motion.std()
+    std = 10**rng.uniform(-1.7, -1.0)
+    reference = motion / scale
+    if not low_pass_hz:
+        reference = reference + std * rng.standard_normal(n)
+    output = output / scale + 10**rng.uniform(-3, -2) * rng.standard_normal(n)
+    return Record.of(*samples(reference, output, rate)), std
+
+
+def test_noise_shows_as_what_is_even_beyond_the_motion():
+    """Twelve draws without a rest and without a frequency that the motion lacks."""
+    ways = []
+    for seed in range(300, 312):
+        pair, std = coloured(seed)
+        noise = reference_noise(pair, 0, pair.valid)
+        assert abs(noise.std - std) < 3 * noise.uncertainty
+        ways.append(noise.by)
+    assert ways.count("excess") >= 4
+
+
+@pytest.mark.parametrize("low_pass_hz", [20.0, 60.0, 200.0])
+def test_a_slow_sensor_is_no_noise_of_the_reference(low_pass_hz):
+    for seed in range(320, 328):
+        pair, _ = coloured(seed, low_pass_hz)
+        assert reference_noise(pair, 0, pair.valid) is None
