@@ -18,7 +18,7 @@ from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
 from .problem import Problem, acts_on_spring
 from .search import Search
-from .seen import added
+from .seen import added, grows_with_motion
 from .stages import COMPARED
 from .stretches import Stretches, stretches_of
 from .words import is_accounted
@@ -54,6 +54,10 @@ _HEAVY_TAILS, _LONG_MEMORY = 0.3, 0.5
 _OF_NOISE = {"bursts": _HEAVY_TAILS, "slow": _LONG_MEMORY}
 # Share of what is left (power) within which a common cause says the same as a filter.
 _PLAINLY = 0.02
+# Share of what a set explains (power) that its core may leave to the others.
+_CORE = 0.005
+# Variances within which two sets say the same.
+_SAME = 1.0
 # Times what is left where it acts that a cause must take (RMS) to stand alone there.
 _ALONE = 10.0
 # Share of the residual's power for which a coarse lattice must account.
@@ -423,16 +427,25 @@ class Engine:
         shares = [left.share, *(share for share, _ in self.structure(fitted))]
         return float(np.sqrt(max(shares))) * left.rms
 
-    def plainer(self, best):
-        """A set in which what is common does nearly the same as a filter: where what is left is no
-        noise, it may favour either."""
+    def plainer(self, best, is_noise):
+        """A set in which what is common does the same as a cause that is odd; or, where what is
+        left is no noise and may favour either, nearly the same as a filter."""
         for cause, effect in best.effects.items():
-            if effect.everyday or not is_link(effect) or cause in self.search.base:
+            if effect.everyday or cause in self.search.base:
                 continue
             plain = self.as_plain(best, cause)
-            if plain and plain.cost < (1 + _PLAINLY) * best.cost:
+            nearly = _SAME / self.problem.count if is_noise or not is_link(effect) else _PLAINLY
+            if plain and plain.cost < (1 + nearly) * best.cost:
                 return plain
         return best
+
+    def core(self, best):
+        """The smallest set that explains nearly all that another one does, or None: what that has
+        more may only make up for what neither says."""
+        most = best.cost + _CORE * max(self.search.baseline.cost - best.cost, 0.0)
+        return min((fit for fit in self.search.fits.values()
+                    if fit.size < best.size and fit.causes - self.search.base.keys()
+                    and fit.cost < most), key=lambda fit: (fit.size, fit.cost), default=None)
 
     def as_plain(self, best, cause):
         """The best fit, no larger, with what is common in the place of a cause; or None."""
@@ -618,6 +631,8 @@ class Engine:
                 of_all = (rest.rms / found.rms)**2
                 found = dataclasses.replace(rest, rms=found.rms, linear=of_all * rest.linear,
                                             level=of_all * rest.level)
+            if grows_with_motion(self, fitted):
+                found = dataclasses.replace(found, level=0.0, level_score=0.0)
         own = self._no_fault(fitted)
         return dataclasses.replace(found, linear=max(found.linear - own, 0.0),
                                    level=max(found.level - own, 0.0))

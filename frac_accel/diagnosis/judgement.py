@@ -150,6 +150,13 @@ def _settled(engine, best, noise_std, known=None):
             if there.gains.keys() - here.gains.keys():
                 here, dropped = there, {**dropped, **gone}
             break
+    core = engine.core(here.best) if here.doubts else None
+    if core:
+        there = _examined(engine, core, noise_std, known)
+        if there.gains and not there.doubts:
+            dropped.update({cause: words for cause, words in here.doubts.items()
+                            if cause not in there.gains})
+            here = there
     if here.doubts:
         standing = here.gains.keys() - here.doubts.keys()
         gone = {**here.doubts, **_refitted(engine, here.best, standing, {})[2]}
@@ -185,9 +192,8 @@ def _without_the_weakest(engine, here, noise_std, known):
 
 
 def _examined(engine, best, noise_std, known):
-    if engine.structure(best) or not engine.is_accounted(
-            best, engine.established_noise(best, noise_std)):
-        best = engine.plainer(best)
+    best = engine.plainer(best, not engine.structure(best) and engine.is_accounted(
+        best, engine.established_noise(best, noise_std)))
     best, gains = _relevant(engine, _mirrored(engine, best), known)
     turned = _mirrored(engine, best)
     if turned is not best:
@@ -344,7 +350,10 @@ def _account(engine, fitted, findings, noise):
     # what the record shows by itself was not fitted; some of it, such as limits, is simulated
     shown = [f for f in findings if f.cause not in fitted.effects]
     for finding in shown:
-        output = finding.effect.simulate(output, p.simulator(p.axis).circumstances)
+        simulated = finding.effect.simulate(output, p.simulator(p.axis).circumstances)
+        # rounded once more, values that noise or other instants have moved are farther off
+        if _rms(p.measured - simulated, rest) < _rms(p.measured - output, rest):
+            output = simulated
     after = _rms(p.measured - output, rest)
     by_itself = [f.gain.after for f in shown]
     own = engine.by_reference(fitted)

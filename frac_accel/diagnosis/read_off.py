@@ -2,24 +2,11 @@
 
 import numpy as np
 
+from .event import event
 from .finding import Finding
 from .gain import certainty, gain
-from .seen import readings
+from .seen import is_noise, readings
 from .words import gain_words
-
-# Samples of a stretch, and share of a record for which it must move, so that the size of what is
-# left can be compared with the motion's: not in a shock.
-_STRETCH = 64
-_LASTS = 0.1
-
-
-def _moving_share(reference):
-    """Share of a record for which the reference moves: its mean power's square over the mean square
-    of the power, in stretches."""
-    count = max(len(reference) // _STRETCH, 1)
-    moving = (reference - reference.mean())[:count * _STRETCH].reshape(count, -1)
-    power = np.mean(np.square(moving), axis=1)
-    return float(power.mean()**2 / max(np.mean(power**2), 1e-300))
 
 
 def read_off(engine, fitted, found, shown):
@@ -34,11 +21,9 @@ def read_off(engine, fitted, found, shown):
         What `of_record` found, by cause.
     """
     findings = []
-    # what the size of a residual tells presumes that it is noise, or bursts of it
-    is_noise = all(part == "bursts" for _, part in engine.structure(fitted)) \
-        and _moving_share(engine.problem.record.reference[:, engine.problem.axis]) > _LASTS
+    noise = is_noise(engine, fitted)
     for cause, effect, reading in readings(engine, fitted, found, shown):
-        if cause not in shown and not is_noise and reading.added is None:
+        if not (cause in shown or noise or reading.evident or reading.added is not None):
             continue
         g = engine.held_out(fitted, cause) if cause in engine.search.base \
             else gain(reading.before, reading.after)
@@ -49,8 +34,11 @@ def read_off(engine, fitted, found, shown):
 
 
 def drowned(engine, fitted, found):
-    """Mask, shape (n,), of the samples in which something that the residual shows by itself drowns
-    whatever else may be wrong; arguments as those of `read_off`."""
+    """Mask, shape (n,), of the samples in which something that the residual shows by itself, or
+    that happened once, drowns whatever else may be wrong; arguments as those of `read_off`."""
+    p = engine.problem
     masks = [reading.drowned for _, _, reading in
              readings(engine, fitted, found, {}) if reading.drowned is not None]
-    return np.any(masks, axis=0) if masks else np.zeros(len(engine.problem.record), bool)
+    if not masks and len(p.record) == len(engine.record):
+        masks = [event(fitted.residual, p.measured, p.used)]
+    return np.any(masks, axis=0) if masks else np.zeros(len(p.record), bool)

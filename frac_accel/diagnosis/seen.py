@@ -7,7 +7,13 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import resample_poly
 
 from ..model.effects import known_effects
+from .gain import gain
 from .leftover import rounding_errors
+
+# Samples of a stretch, and share of a record for which it must move, so that the size of what is
+# left can be compared with the motion's: not in a shock.
+_STRETCH = 64
+_LASTS = 0.1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,15 +83,38 @@ def added(engine, fitted):
     that the motion makes."""
     p = engine.problem
     total = np.zeros(len(p.record))
-    for _, _, reading in readings(engine, fitted, engine.found, {}, by_sample=True):
+    for _, _, reading in readings(engine, fitted, engine.found, {},
+                                  lambda cls: cls.known_by_sample):
         if reading.added is not None:
             total[p.coherent] += reading.added
     return total * p.used
 
 
-def readings(engine, fitted, found, shown, by_sample=False):
-    """(Cause, effect, `Reading`) of each that the record shows by itself, or of those only that
-    tell what they add to each sample."""
+def grows_with_motion(engine, fitted):
+    """Whether a fit leaves noise that a cause lets come and go with the motion's size."""
+    return is_noise(engine, fitted) and any(
+        gain(reading.before, reading.after).is_relevant for _, _, reading in readings(
+            engine, fitted, engine.found, {}, lambda cls: cls.goes_with_size))
+
+
+def is_noise(engine, fitted):
+    """Whether a fit leaves noise, or bursts of it, beside a motion that lasts: what the size of a
+    residual tells presumes that."""
+    return all(part == "bursts" for _, part in engine.structure(fitted)) \
+        and _moving_share(engine.problem.record.reference[:, engine.problem.axis]) > _LASTS
+
+
+def _moving_share(reference):
+    """Share of a record for which the reference moves: its mean power's square over the mean square
+    of the power, in stretches."""
+    count = max(len(reference) // _STRETCH, 1)
+    moving = (reference - reference.mean())[:count * _STRETCH].reshape(count, -1)
+    power = np.mean(np.square(moving), axis=1)
+    return float(power.mean()**2 / max(np.mean(power**2), 1e-300))
+
+
+def readings(engine, fitted, found, shown, wanted=lambda cls: True):
+    """(Cause, effect, `Reading`) of each wanted cause that the record shows by itself."""
     p = engine.problem
     here = p.coherent
     record = p.part(here)
@@ -97,7 +126,7 @@ def readings(engine, fitted, found, shown, by_sample=False):
                     entry["part"]: entry["share"] for entry in engine.budget(fitted).parts
                     if entry["ci95"][0] > 0})
     for cause, cls in known_effects().items():
-        if not cls.read_off or (by_sample and not cls.known_by_sample):
+        if not cls.read_off or not wanted(cls):
             continue
         recognised = cls.recognised(seen, shown.get(cause))
         if recognised is not None:

@@ -44,11 +44,12 @@ def reason_of(verdict, nrmse, noise, accounted, strange):
     to = shown[noise.by] if noise.rms is not None and nrmse > _LITTLE and accounted \
         else f"up to {_percent(nrmse)} of the output"
     left = f"; {_percent(nrmse)} of the output is left"
+    parts = ", ".join(f"{share:.0%} {part} ({WORDS[part]})" for share, part in strange[:2])
     if strange:
-        parts = ", ".join(f"{share:.0%} {part} ({WORDS[part]})" for share, part in strange[:2])
         left += f", of which {parts}"
     return {"consistent": f"the model explains the record {to}",
-            "explained": f"the named causes explain the record {to}",
+            "explained": f"the named causes explain the record {to}"
+                         + (f"; of what is left, {parts}" if strange else ""),
             "partly_explained": "the named causes leave a part unexplained" + left,
             "unexplained": "no known cause explains what the model gets wrong" + left,
             "undecided": f"{nrmse:.1%} of the output is unaccounted for; {_unknown(noise)}; "
@@ -66,7 +67,7 @@ def set_aside(aside, drowned, valid):
         "; " + several(rows.sum(), "sample does not count", "samples do not count")
         + f" ({rows.sum() / valid.sum():.2%}): {why} there"
         for rows, why in ((aside, "a signal stood still or had spikes"),
-                          (drowned, "bursts drown all else")) if rows.any())
+                          (drowned, "a short and strong error drowns all else")) if rows.any())
 
 
 def description_words(described, unnamed):

@@ -41,7 +41,8 @@ from .path_dependent import slew_limited
 PARTLY = {
     "duffing_mount": ("mounting_resonance",),               # for small motion
     "batched_stamps": ("time_delay", "timestamp_jitter"),   # its mean and the rest
-    "resampling_glitches": ("sampling_jitter",),            # though it has a pattern
+    # a read-out of the nearest value instead of the last; its pattern may pass for chance
+    "resampling_glitches": ("sampling_jitter", "polled_readout"),
 }
 
 

@@ -26,8 +26,9 @@ _AT_MOST = 0.5
 _DEVIATIONS = 4.0
 # Mean of the error in bursts, over its RMS there, up to which noise has it, too.
 _ONE_SIDED = 0.3
-# Share of the error budget that bursts must have.
-_SHOWN = 0.01
+# Share of the error budget that bursts must have, and where one topic was put on the other's
+# instants: there it lacks what is fast of the motion.
+_SHOWN, _SHOWN_RESAMPLED = 0.01, 0.5
 # Share of the samples in bursts that may repeat the one before them: a sensor that is stuck.
 _REPEATED = 0.5
 # Share of what two noises gain that a noise which grows with the motion may gain.
@@ -62,10 +63,11 @@ class InterferenceBursts(Effect):
         # a burst of a few strong samples looks like spikes
         used = (seen.used | seen.spikes) & ~_near(~seen.record.valid)
         error, output = (seen.measured - seen.output)[used], seen.output[used]
-        if len(error) < 10 * _WINDOW or seen.record.resampled:
-            return None  # where the motion is too fast for one topic, the other's instants lack it
+        if len(error) < 10 * _WINDOW:
+            return None
+        least = _SHOWN_RESAMPLED if seen.record.resampled else _SHOWN
         noise, loud, share, better = _two_noises(error)
-        if seen.parts().get("bursts", 0.0) < _SHOWN or not 0 < share < _MOST \
+        if seen.parts().get("bursts", 0.0) < least or not 0 < share < _MOST \
                 or loud < _LOUDER**2 * noise or better < _BETTER:
             return None
         inside = _in_bursts(error, noise, loud, share)

@@ -7,8 +7,9 @@ import numpy as np
 from ..parameters import parameter
 from .base import QUANTIZATION, Effect, Reading
 
-# Largest share of an error's power that is ascribed to rounding.
-_MOST = 0.99
+# Share of an error's power that rounding must have where the values have been put on other
+# instants, and largest share that is ascribed to it.
+_LEAST, _MOST = 0.2, 0.99
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,21 +28,33 @@ class Quantization(Effect):
     def of_record(cls, found, measured):
         return cls(found.step) if found.step else None
 
+    @classmethod
+    def recognised(cls, seen, shown):
+        if "sensor" not in seen.record.resampled:
+            return super().recognised(seen, shown)
+        # the values on other instants have no lattice
+        step = seen.record.step("sensor", seen.axis)
+        reading = cls(step).reading(seen) if step else None
+        return (cls(step), reading) if reading is not None \
+            and step**2 / 12 > _LEAST * np.mean(reading.before**2) else None
+
     def reading(self, seen):
         """Where noise is rounded too, rounding the simulated values gains nothing.
 
         What rounding has added is then known by its power alone, step**2 / 12 (B. Widrow,
         I. Kollar, *Quantization Noise* (2008)).
         """
-        if not seen.is_coarse:
+        if not seen.is_coarse and "sensor" not in seen.record.resampled:
             return None
-        before = (seen.measured - seen.output)[seen.used]
-        after = (seen.measured - self.simulate(seen.output, None))[seen.used]
+        values, output, used = seen.as_recorded()
+        before = (values - output)[used]
+        after = (values - self.simulate(output, None))[used]
         share = min(self.step**2 / 12 / np.mean(before**2), _MOST)
         if np.mean(after**2) > (1 - share) * np.mean(before**2):
             after = before * np.sqrt(1 - share)
         return Reading({"step": 1e-6 * self.step}, before, after,
-                       next(words for words in seen.found.words if "multiples" in words))
+                       next(words for words in seen.found.words if "multiples" in words),
+                       evident="sensor" in seen.record.resampled)
 
     def simulate(self, values, circumstances):
         return self.step * np.round(values / self.step)

@@ -1,0 +1,35 @@
+"""Causes that were missed in cars: rates that differ, a noisy reference, gravity on the axis."""
+
+import pytest
+from rig.hidden import draw_case
+from rig.road_cases import draw_road_case
+
+from frac_accel import diagnose
+
+
+def names(case):
+    reference, sensor, temperature = case.samples()
+    found = diagnose((reference, sensor), case.model(), temperature=temperature)
+    return {finding.cause for finding in found.findings}, found
+
+
+@pytest.mark.parametrize("seed, cause", [
+    (7_160_000, "quantization"),         # of values that were put on other instants
+    (7_160_000, "interference_bursts"),
+    (7_160_000, "late_stamps"),          # beside a reference whose noise fills the band
+    (7_460_000, "offset"),               # under gravity a dead zone does the same
+])
+def test_named_on_the_road(seed, cause):
+    case = draw_road_case(seed, [cause])
+    found, _ = names(case)
+    assert case.causes <= found <= case.causes | set(case.besides)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed, cause", [
+    (903, "sensitivity_error"), (903, "low_pass_lag"), (900, "cubic_stiffness"),
+    (902, "cubic_stiffness")])
+def test_named_beside_instants_that_scatter(seed, cause):
+    found, result = names(draw_case(seed, [cause, "sampling_jitter"]))
+    assert found == {cause, "sampling_jitter"}
+    assert result.verdict == "explained"
