@@ -22,6 +22,7 @@ from ..record.sources import pair_of
 from ..shown import several
 from ..simulation import AxisSimulator
 from .engine import Engine
+from .event import event
 from .finding import Diagnosis, Finding, insufficient
 from .flat import flat_instead
 from .judgement import judge
@@ -222,13 +223,16 @@ def _without_spikes(engine, used, stray, reference):
 
 
 def _without_drowned(begin, engine, best, found, seed):
-    """Engine whose fits leave out the samples in which what the record shows by itself drowns all
-    else, and its best set; those given where there are none."""
-    hidden = drowned(engine, best, found)
+    """Engine whose fits leave out the samples in which what the record shows by itself, or what
+    happened once, drowns all else, and its best set; those given where there are none."""
+    hidden = shown = drowned(engine, best, found)
+    if not hidden.any() and len(engine.record) == len(best.residual):
+        hidden = event(best.residual, engine.problem.measured, engine.problem.used)
     if not hidden.any():
         return engine, best
     other = begin(used=engine.wanted & ~hidden)
-    other.spikes, other.aside = engine.spikes | hidden, engine.aside & ~hidden
+    # what the record shows by itself is looked at once more
+    other.spikes, other.aside = engine.spikes | shown, engine.aside & ~hidden
     other.drowned, other.at_limit = hidden, engine.at_limit
     other.identified, other.found = engine.identified, engine.found
     return other, other.run(seed)

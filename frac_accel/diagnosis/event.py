@@ -9,6 +9,9 @@ _STANDS_OUT = 30.0
 _MOST, _RARE = 3, 0.02
 # Share of what is left that must lie there, and share of the motion that may: in a shock all does.
 _HOLDS, _OF_MOTION = 0.5, 0.2
+# Mean of the error in a place, over its RMS there, up to which it may be one: what rectifies strong
+# motion, or shifts with it, has one sign.
+_ONE_SIDED = 0.3
 
 
 def event(residual, motion, used):
@@ -30,13 +33,14 @@ def event(residual, motion, used):
     size = count * _WINDOW
     left, moving = (np.where(used, values, 0.0)[:size].reshape(count, _WINDOW) for values in
                     (residual, motion - motion[used].mean()))
+    one_sided = np.abs(left.mean(axis=1)) > _ONE_SIDED * np.sqrt(np.mean(left**2, axis=1))
     left, moving = np.sum(left**2, axis=1), np.sum(moving**2, axis=1)
     for places in range(1, _MOST + 1):
         marked = np.zeros(count, bool)
         loudest = []
         for _ in range(places):
             top = int(np.argmax(np.where(marked, 0.0, left)))
-            loudest.append(left[top])
+            loudest.append(0.0 if one_sided[top] else left[top])
             # its edges lie in the windows beside it
             marked[max(top - 1, 0):top + 2] = True
         if min(loudest) > _STANDS_OUT * left[~marked].max() \

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from .event import event
 from .finding import Finding
 from .gain import certainty, gain
 from .seen import is_noise, readings
@@ -34,11 +33,8 @@ def read_off(engine, fitted, found, shown):
 
 
 def drowned(engine, fitted, found):
-    """Mask, shape (n,), of the samples in which something that the residual shows by itself, or
-    that happened once, drowns whatever else may be wrong; arguments as those of `read_off`."""
-    p = engine.problem
+    """Mask, shape (n,), of the samples in which something that the residual shows by itself drowns
+    whatever else may be wrong; arguments as those of `read_off`."""
     masks = [reading.drowned for _, _, reading in
              readings(engine, fitted, found, {}) if reading.drowned is not None]
-    if not masks and len(p.record) == len(engine.record):
-        masks = [event(fitted.residual, p.measured, p.used)]
-    return np.any(masks, axis=0) if masks else np.zeros(len(p.record), bool)
+    return np.any(masks, axis=0) if masks else np.zeros(len(engine.problem.record), bool)
