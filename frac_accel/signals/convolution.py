@@ -12,10 +12,13 @@ _DAMPING = np.log(1e8)
 # Records in one period of the transform, so that nothing wraps around.
 _PERIOD = 2
 # Shares of the frequencies, the highest, over which a response may be turned to be real at the
-# last; and the error, over the input, that this leaves in the middle of a record, times the share's
-# square: measured on 3000 samples of noise that ends below it, delayed by a third of a sample.
-_TURNED = 0.2, 0.1, 0.05, 0.02, 0.01
-_RINGS = 1.2e-8
+# last; samples of a record times a share from which it may be smaller than the first, and times
+# the first one at least, so that what rings has faded before it comes round; and by how much over
+# that product it rings in the middle of the record (the square of it): noise that ends below the
+# share, a third of a sample late.
+_TURNED = 0.2, 0.1, 0.05, 0.02, 0.01, 0.005
+_FADED, _SHORT = 30.0, 12.0
+_RINGS = 0.33
 # Undamping factors that are kept.
 _UNDAMPINGS = 4
 _LAGRANGE_POINTS = 8
@@ -135,13 +138,14 @@ def _turned(values):
 
     Where it has power, its response is a wrong one; the fewer they are, the farther it rings.
     """
-    power = np.square(np.abs(rfft((values - np.mean(values)) * np.hanning(len(values)))))
+    n = len(values)
+    power = np.square(np.abs(rfft((values - np.mean(values)) * np.hanning(n))))
     above = np.cumsum(power[::-1])
 
     def error(share):
         return np.sqrt(above[int(share * (len(power) - 1))] / max(above[-1], 1e-300)) \
-            + _RINGS / share**2
-    return min(_TURNED, key=error)
+            + (_RINGS / (share * n))**2
+    return min([max(_TURNED[0], min(_SHORT / n, 1.0)), *(share for share in _TURNED[1:] if share * n >= _FADED)], key=error)
 
 
 def _fast_length(n):

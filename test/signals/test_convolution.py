@@ -26,3 +26,13 @@ def test_a_part_of_a_sample_late(gain, error):
     convolution = Convolution(values, 1.0)
     found = convolution.response(np.exp(-convolution.s * LATE))
     assert np.std((found - late)[500:-500]) < error * np.std(late)
+
+
+@pytest.mark.parametrize("n", [12, 20, 40, 100, 200, 400, 1000, 5000])
+def test_what_rings_does_not_come_round(n):
+    """Full-band input of any length: no sample of the response is far larger than the input."""
+    for seed in range(10):
+        values = np.random.default_rng(seed).standard_normal(n)
+        convolution = Convolution(values, 1.0)
+        found = convolution.response(np.exp(-convolution.s * LATE))
+        assert np.max(np.abs(found)) < 1.6 * np.max(np.abs(values))
