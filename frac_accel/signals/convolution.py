@@ -145,7 +145,9 @@ def _turned(values):
     def error(share):
         return np.sqrt(above[int(share * (len(power) - 1))] / max(above[-1], 1e-300)) \
             + (_RINGS / (share * n))**2
-    return min([max(_TURNED[0], min(_SHORT / n, 1.0)), *(share for share in _TURNED[1:] if share * n >= _FADED)], key=error)
+    shares = [max(_TURNED[0], min(_SHORT / n, 1.0)),
+              *(share for share in _TURNED[1:] if share * n >= _FADED)]
+    return min(shares, key=error)
 
 
 def _fast_length(n):
