@@ -153,7 +153,9 @@ def _settled(engine, best, noise_std, known=None):
     core = engine.core(here.best) if here.doubts else None
     if core:
         there = _examined(engine, core, noise_std, known)
-        if there.gains and not there.doubts:
+        # what is certain already stays
+        if there.gains and not there.doubts \
+                and here.gains.keys() - here.doubts.keys() <= there.gains.keys():
             dropped.update({cause: words for cause, words in here.doubts.items()
                             if cause not in there.gains})
             here = there
