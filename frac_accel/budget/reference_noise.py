@@ -112,7 +112,7 @@ def reference_noise(record, column, used, covariance_std=None, transfer_function
     power = float(np.var(one))
     most = np.quantile(own[inner], _FLOOR)
     for density, by in _estimates(record, column, used, covariance_std, own_rate, most, size,
-                                  transfer_function):
+                                  (frequency, own), transfer_function):
         std = np.sqrt(density * own_rate / 2)
         bends = density * rate / 2 / power > _LEAST
         # an excess that bends nothing may be some other small thing
@@ -142,10 +142,12 @@ def _inner(frequency, record):
     return slice(2, min(np.searchsorted(frequency, record.band_hz or np.inf), len(frequency) - 1))
 
 
-def _estimates(record, column, used, covariance_std, own_rate, most, size, transfer_function):
+def _estimates(record, column, used, covariance_std, own_rate, most, size, spectrum,
+               transfer_function):
     """Pairs of a density [(m/s²)²/Hz] and what shows it, the best first.
 
-    `own_rate` [Hz] is that at which the reference was sampled, `most` its lowest density.
+    `own_rate` [Hz] is that at which the reference was sampled, `most` its lowest density,
+    `spectrum` its frequencies and densities.
     """
     rate, one, two = record.sampling_rate_hz, record.reference[:, column], record.sensor[:, column]
     if "reference" not in record.resampled:
@@ -157,8 +159,13 @@ def _estimates(record, column, used, covariance_std, own_rate, most, size, trans
     if _given(covariance_std) and not _untrusted(covariance_std, None,
                                                  _SCATTERS * np.sqrt(most * own_rate / 2)):
         yield 2 * covariance_std**2 / own_rate, "covariance"
-    for find, by in (_floor, "floor"), (_excess, "excess"):
-        density = find(one, two, record, size, transfer_function)
+    other = welch(two, rate, nperseg=size)[1]
+    shared = np.abs(csd(one, two, rate, nperseg=size)[1])
+    inner = _inner(spectrum[0], record)
+    spectra = [values[inner] for values in (*spectrum, other, shared)]
+    median = welch(one, rate, nperseg=size, average="median")[1][inner]
+    for density, by in ((_floor(*spectra[1:], median), "floor"),
+                        (_excess(*spectra, len(one) / size, transfer_function), "excess")):
         if density is not None:
             yield density, by
 
@@ -181,30 +188,31 @@ def _at_rest(one, two, used, rate):
     return float(np.sqrt(np.mean(parts[0][quiet]**2))) if shared < _SHARED**2 else None
 
 
-def _floor(one, two, record, size, transfer_function):
-    """An even density of the reference at frequencies where the sensor has none of it, or None."""
-    rate = record.sampling_rate_hz
-    frequency, own = welch(one, rate, nperseg=size)
-    other, shared = welch(two, rate, nperseg=size)[1], csd(one, two, rate, nperseg=size)[1]
-    inner = _inner(frequency, record)
-    own, other, shared = own[inner], other[inner], shared[inner]
+def _floor(own, other, shared, median):
+    """An even density of the reference at frequencies where the sensor has none of it, or None.
+
+    Parameters
+    ----------
+    own, other, shared, median : ndarray, shape (n,)
+        Densities of the reference, the sensor and both (absolute), and the median of the
+        reference's over the segments.
+    """
     # one that most segments do not have is that of a few spikes
-    median = welch(one, rate, nperseg=size, average="median")[1][inner]
     if np.quantile(median, _FLOOR) < _STEADY * np.quantile(own, _FLOOR):
         return None
-    coherence = np.abs(shared)**2 / np.maximum(own * other, 1e-300)
+    coherence = shared**2 / np.maximum(own * other, 1e-300)
     apart, together = coherence < _SHARED, coherence > 0.9
     if apart.mean() < _WIDE or not together.any():
         return None
     low, high = np.quantile(own[apart], (0.1, 0.9))
     density = np.median(own[apart])
-    gain = np.median(np.abs(shared[together] / own[together]))
+    gain = np.median(shared[together] / own[together])
     if high > _EVEN * low or np.median(other[apart]) > _LOUDEST * gain**2 * density:
         return None
     return float(density)
 
 
-def _excess(one, two, record, size, transfer_function):
+def _excess(frequency, own, other, shared, segments, transfer_function):
     r"""An even density of the reference beyond the motion that the sensor shows, or None.
 
     With the motion's density :math:`S_{aa}`, noise of density N on the reference, and the model's
@@ -213,15 +221,20 @@ def _excess(one, two, record, size, transfer_function):
     motion, smoothly over the frequency: where the motion's spectrum is smooth, too, nothing tells
     one from the other, and there is no answer (J. S. Bendat, A. G. Piersol, *Random Data*, 4th ed.
     (2010), chapter 6).
+
+    Parameters
+    ----------
+    frequency, own, other, shared : ndarray, shape (n,)
+        Frequencies [Hz], densities of the reference, the sensor and both (absolute).
+    segments : float
+        Of the record, side by side.
+    transfer_function : callable or None
+        As of `reference_noise`.
     """
-    rate = record.sampling_rate_hz
-    frequency, own = welch(one, rate, nperseg=size)
-    other, shared = welch(two, rate, nperseg=size)[1], np.abs(csd(one, two, rate, nperseg=size)[1])
-    # half of the overlapping segments' pairs are independent values of a real part
-    count = 3 * len(one) / size
-    rows = np.zeros(len(frequency), bool)
-    rows[_inner(frequency, record)] = True
-    rows &= shared**2 > _COHERENT * own * other
+    # those that overlap by half are worth one and a half times as many, and the real part of what
+    # two signals share scatters by half as much (power)
+    count = 3 * segments
+    rows = shared**2 > _COHERENT * own * other
     if rows.sum() < _LINES_SHARED:
         return None
     frequency, own, other, shared = frequency[rows], own[rows], other[rows], shared[rows]

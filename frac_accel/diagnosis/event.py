@@ -35,15 +35,14 @@ def event(residual, motion, used):
                     (residual, motion - motion[used].mean()))
     one_sided = np.abs(left.mean(axis=1)) > _ONE_SIDED * np.sqrt(np.mean(left**2, axis=1))
     left, moving = np.sum(left**2, axis=1), np.sum(moving**2, axis=1)
-    for places in range(1, _MOST + 1):
-        marked = np.zeros(count, bool)
-        loudest = []
-        for _ in range(places):
-            top = int(np.argmax(np.where(marked, 0.0, left)))
-            loudest.append(0.0 if one_sided[top] else left[top])
-            # its edges lie in the windows beside it
-            marked[max(top - 1, 0):top + 2] = True
-        if min(loudest) > _STANDS_OUT * left[~marked].max() \
+    marked = np.zeros(count, bool)
+    for _ in range(_MOST):
+        top = int(np.argmax(np.where(marked, 0.0, left)))
+        if one_sided[top]:
+            break
+        # its edges lie in the windows beside it
+        marked[max(top - 1, 0):top + 2] = True
+        if left[top] > _STANDS_OUT * left[~marked].max() \
                 and left[marked].sum() > _HOLDS * left.sum() \
                 and moving[marked].sum() < _OF_MOTION * moving.sum():
             return np.r_[np.repeat(marked, _WINDOW), none[size:]]
