@@ -11,7 +11,8 @@ TRIALS["clipped"] = next(trial for trial in plan(61, GROUPS)
 # What is hidden, and what is named besides since it is there, too.
 EXACT = {
     "road_single/reference_noise/0": {"reference_noise"},
-    "road_single/cross_axis_sensitivity/0": {"cross_axis_sensitivity", "reference_noise"},
+    "road_single/cross_axis_sensitivity/0": {
+        "cross_axis_sensitivity", "quantization", "reference_noise"},
     "clipped": {"clipping"},
     "road_single/second_resonance/0": {"second_resonance", "quantization", "reference_noise"},
     "road_single/reference_low_pass/0": {"reference_low_pass", "clock_skew"},
