@@ -10,6 +10,7 @@ from scipy.ndimage import binary_erosion
 
 from ..budget.reference_noise import reference_noise
 from ..errors import FracAccelError, IdentificationError
+from ..identification.checks.clipped import clipped_sensor
 from ..identification.checks.record_checks import moving_samples
 from ..identification.response.excitation import held_out, require_excitation
 from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC
@@ -17,6 +18,7 @@ from ..model import AXES, SensorModel
 from ..model.core import Gain, Oscillator
 from ..model.effects import known_effects
 from ..record import Record
+from ..record.clipping import at_limits
 from ..record.orientation import Orientation, turned_away
 from ..record.sources import pair_of
 from ..shown import several
@@ -117,6 +119,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     moving, notes = moving_samples(record, column)
     found.words.extend(notes)
     used = record.valid & moving
+    found = _with_limits(found, record, column, used)
     noise = reference_noise(record, column, used, _stated_noise(source[0], column),
                             model and model.axis(axis).transfer_function)
     if noise and noise.bends:
@@ -155,6 +158,24 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if orientation:
         judged = with_turn(judged, engine, orientation)
     return dataclasses.replace(judged, screened=screened(engine)) if screening else judged
+
+
+def _with_limits(found, record, column, used):
+    """`Integrity` with limits at which too few samples pile up to be certain by themselves, where
+    a classical sensor, identified without them, goes beyond."""
+    if record.resampled:
+        return found
+    measured = record.sensor[:, column]
+    certain = (measured == found.lower) | (measured == found.upper)
+    clipping = clipped_sensor(record.reference[:, column], measured, used & ~certain, found.step,
+                              record.sampling_rate_hz, record.lag_s)
+    if not clipping.samples.any():
+        return found
+    lower = clipping.lower if found.lower is None else found.lower
+    upper = clipping.upper if found.upper is None else found.upper
+    return dataclasses.replace(
+        found, lower=lower, upper=upper,
+        words=found.words + at_limits(measured[clipping.samples], clipping.lower, clipping.upper))
 
 
 def _in_every_fit(loose, shown):

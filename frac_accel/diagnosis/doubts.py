@@ -440,12 +440,15 @@ def _elsewhen(engine, best, takes, left):
     courses = [cause for cause in takes if best.effects[cause].shows_with_time
                and not best.effects[cause].everyday]
     rest = engine.rms(best.residual)
-    # a sweep's frequency and level change with time, too: several follow any course
-    for cause in courses if len(courses) > 1 else ():
-        if takes[cause] < WEIGHS * rest:
-            found.setdefault(cause, f"{', '.join(courses)} together follow any course in time, "
-                                    f"and it takes {takes[cause]:.3g} RMS only beside {rest:.3g} "
-                                    "that are left")
+    # a sweep's frequency and level change with time, too: several follow any course of the motion,
+    # as several offsets do of the mean
+    for kind in (False, True):
+        alike = [cause for cause in courses if (best.effects[cause].stage == OFFSET) == kind]
+        for cause in alike if len(alike) > 1 else ():
+            if takes[cause] < WEIGHS * rest:
+                found.setdefault(cause, f"{', '.join(alike)} together follow any course in time, "
+                                        f"and it takes {takes[cause]:.3g} RMS only beside "
+                                        f"{rest:.3g} that are left")
     return found
 
 

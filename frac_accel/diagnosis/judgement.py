@@ -8,7 +8,7 @@ from scipy.special import expit
 
 from ..errors import FracAccelError
 from ..identification.fit.uncertainty import beyond_noise, noise_floor
-from ..model import AXES, AxisModel, SensorModel
+from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.effects import effect_of, known_effects
 from .doubts import by_what_is_left, doubts_about, left_open, resembles
 from .empirical import fit_empirical_link
@@ -46,6 +46,8 @@ _CLEAR = 10.0
 _NEARLY = 0.05
 # Share of what the largest cause takes (RMS) that a common one must take to be named for that.
 _COMMON = 0.1
+# Share of the error that all else leaves up to which what is only suspected describes a record.
+_CLEARLY = 0.9
 # Share by which a parameter may move when what is only suspected is left out.
 _OTHERS = 0.25
 # Standard uncertainties from the model's own value by which a parameter has moved.
@@ -69,7 +71,7 @@ def judge(engine, best, found, shown, noise_std=None):
     -------
     Diagnosis
     """
-    known, doubted = {}, {}
+    known, doubted, widest = {}, {}, best
     if engine.part:
         shorter, doubted = _settled(engine.part, best, noise_std)
         engine.part.best = shorter.best
@@ -108,7 +110,7 @@ def judge(engine, best, found, shown, noise_std=None):
         else:
             suspects.append(_suspect({cause, *instead}, margin, "another cause explains as much"))
             tied[cause] = other
-    return _verdict(engine, best, left, findings, suspects, tied, found, noise,
+    return _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
                     lambda fitted: read_off(engine, fitted, found, shown))
 
 
@@ -245,7 +247,7 @@ def _suspect(causes, margin, reason):
             "experiment": separating_experiment(causes)}
 
 
-def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_by):
+def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise, shown_by):
     fraction = _remaining(engine, best, left.noise_rms) if left.share > 0 else 0.0
     findings, fitted, stds, more = _sure(engine, best, findings, tied, left, fraction)
     suspects += more
@@ -267,10 +269,13 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
     verdict = verdict_of(
         findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
         fraction, account.accounted, strange or account.faulty)
-    described, after = _described(engine, fitted, account.after, {part for _, part in strange}) \
-        if verdict in _INCOMPLETE or strange else ({}, account.after)
+    described, kept, after = {}, {}, account.after
+    if verdict in _INCOMPLETE or strange:
+        described, after = _described(engine, fitted, after, {part for _, part in strange})
+        kept, after = _kept(engine, fitted, widest, after)
     named = {f.cause: f.effect for f in findings}
-    model = _extended(engine, {**fitted.effects, **named, **{e.cause: e for e in described}},
+    model = _extended(engine, {**fitted.effects, **named, **(kept or {
+        effect.cause: effect for effect in described})},
                       _stated(engine.problem, fitted, after / account.spread))
     p, spread = engine.problem, account.spread
     # a model that has the limits leaves nothing there
@@ -280,7 +285,8 @@ def _verdict(engine, best, left, findings, suspects, tied, found, noise, shown_b
     return Diagnosis(
         verdict, reason_of(verdict, account.share, noise, account.accounted, strange)
         + set_aside(engine.aside, engine.drowned, engine.record.valid)
-        + description_words([*described.values()], unnamed)
+        + description_words([] if kept else [*described.values()], unnamed,
+                            sorted(kept.keys() - fitted.causes), after / spread)
         + hidden_words(account.own, account.error),
         {"rmse": account.before, "nrmse": account.before / spread, "noise_rms": left.noise_rms},
         findings, suspects,
@@ -454,6 +460,25 @@ def _described(engine, fitted, after, parts):
             effects, output, after = more, simulated, error
             described[found.effect] = words
     return described, after
+
+
+def _kept(engine, fitted, widest, after):
+    """Effects of a set with linear causes that are only suspected, where it predicts held-out data
+    clearly better than all else that describes them, and the held-out error; or none."""
+    p, rest = engine.problem, engine.held_out_rows
+    more = {cause: effect for cause, effect in widest.effects.items()
+            if cause not in fitted.causes and (is_link(effect) or effect.pure_delay_s()
+                                               or effect.is_constant or effect.restates_core)}
+    if not more or p.limit.ends_judging("what is only suspected was not kept as a description"):
+        return {}, after
+    wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
+    errors = [(p.measured - engine.learnt(fit).output)[rest] for fit in (fitted, wider)]
+    error = _rms(p.measured - wider.output, rest)
+    better = gain(*errors)
+    if not better.is_relevant or engine.hollow(wider) \
+            or max(error, _rms(errors[1], slice(None))) > _CLEARLY * after:
+        return {}, after
+    return wider.effects, error
 
 
 def _extended(engine, effects, stated):

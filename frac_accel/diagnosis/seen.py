@@ -55,27 +55,63 @@ class Seen:
                                     self.used, self.found.step))
 
     def at_stamps(self):
-        """Samples of the sensor's topic with an instant, these instants, and the simulated output
-        at the stamps that they carry."""
-        stamps = self.record.topics[1].stamps_ns
-        rate = self.record.sampling_rate_hz
-        place = (stamps - self.record.start_ns) * 1e-9 * rate
-        slot = np.round(place).astype(int)
+        """Values as they were recorded, where the fit counted samples, the simulated output at
+        their instants, and at the stamps that they carry, each of shape (m,)."""
+        topic = self.record.topics[1]
+        stamped = self._place((topic.stamps_ns - topic.stamps_ns[0]) * 1e-9)
+        if "sensor" in self.record.resampled:
+            return self._beside(stamped)
+        slot = (topic.clock.slot + np.round(np.median(
+            stamped + self.record.lag_s * self.record.sampling_rate_hz - topic.clock.slot)))
         good = (slot >= 0) & (slot < len(self.output))
-        fine = resample_poly(self.output, 4, 1)
-        spline = CubicSpline(np.arange(len(fine)) / 4, fine)
-        return good, slot[good], spline(np.clip(place[good] - self.record.lag_s * rate, 0,
-                                                len(self.output) - 1))
+        good[good] = self.used[slot[good].astype(int)]
+        slot = slot[good].astype(int)
+        return self.measured[slot], self.output[slot], self._output_at(stamped[good])
+
+    def as_counted(self):
+        """The same, but at the instants that they would have if no sample were missing."""
+        if "sensor" in self.record.resampled:
+            clock, count = self.record.topics[1].clock, len(self.record.topics[1])
+            start = clock.instants_s(self.record.topics[1].stamps_ns)[0]
+            return self._beside(self._place(start + np.arange(count) / clock.rate_hz))
+        counted = np.flatnonzero(self.record.valid)
+        used = self.used[counted]
+        return (self.measured[counted][used], self.output[counted][used],
+                self.output[:len(counted)][used])
 
     def as_recorded(self):
         """Values before they were resampled, the simulated output at their instants, and which of
         them lie where the fit counted samples."""
-        if "sensor" not in self.record.resampled:
-            return self.measured[self.rows], self.output[self.rows], self.used[self.rows]
-        good, slot, output = self.at_stamps()
-        there = self.rows[slot]
-        values = self.record.topics[1].values[good, self.axis]
-        return values[there], output[there], self.used[slot[there]]
+        if "sensor" in self.record.resampled:
+            return self._before_resampling()[1:]
+        return self.measured[self.rows], self.output[self.rows], self.used[self.rows]
+
+    def _before_resampling(self):
+        """`as_recorded`, and which of the topic's samples they are."""
+        topic = self.record.topics[1]
+        place = self._place(topic.clock.instants_s(topic.stamps_ns))
+        slot = np.round(place).astype(int)
+        good = (slot >= 0) & (slot < len(self.output))
+        good[good] = self.rows[slot[good]]
+        return (good, topic.values[good, self.axis], self._output_at(place[good]),
+                self.used[slot[good]])
+
+    def _beside(self, place):
+        """Values before they were resampled, the output at their instants and at other places."""
+        good, values, output, used = self._before_resampling()
+        return values[used], output[used], self._output_at(place[good][used])
+
+    def _place(self, seconds):
+        """Places among the record's instants of times after the topic's first stamp."""
+        record = self.record
+        start_s = (record.topics[1].stamps_ns[0] - record.start_ns) * 1e-9 - record.lag_s
+        return (start_s + seconds) * record.sampling_rate_hz
+
+    def _output_at(self, place):
+        """Simulated output between the record's instants."""
+        fine = resample_poly(self.output, 4, 1)
+        spline = CubicSpline(np.arange(len(fine)) / 4, fine)
+        return spline(np.clip(place, 0, len(self.output) - 1))
 
 
 def added(engine, fitted):

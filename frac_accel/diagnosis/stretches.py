@@ -151,7 +151,8 @@ class Stretches(Problem):
                 continue
             part = Problem(self._whole[0].part(rows), self.axis, self.baseline,
                            self._whole[1][rows], self.limit)
-            begins_s, ends_s = rows.start / self.rate, rows.stop / self.rate
+            begins_s = part.record.since_start_s
+            ends_s = begins_s + len(part.record) / self.rate
             before, after = (part.point({**effects, unknown.cause: dataclasses.replace(
                 effects[unknown.cause], **{unknown.name: instant})}, False).residual**2
                 for instant in (ends_s, begins_s))
@@ -167,8 +168,9 @@ class Stretches(Problem):
 
     def _around(self, at_s):
         """Slice from one stretch into the next where an instant lies between them, or None."""
+        place = (at_s - self._whole[0].since_start_s) * self.rate
         for one, other in zip(self.slices, self.slices[1:]):
-            if one.stop - 2 * self.edge < at_s * self.rate < other.start + 2 * self.edge:
+            if one.stop - 2 * self.edge < place < other.start + 2 * self.edge:
                 return slice(one.stop - _OVERLAP, other.start + _OVERLAP)
         return None
 

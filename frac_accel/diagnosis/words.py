@@ -70,15 +70,18 @@ def set_aside(aside, drowned, valid):
                           (drowned, "a short and strong error drowns all else")) if rows.any())
 
 
-def description_words(described, unnamed):
-    """Words for what the extended model holds beside named causes: fitted curves, and causes that
-    were identified with it."""
+def description_words(described, unnamed, kept, left):
+    """Words for what the extended model holds beside named causes: fitted curves, causes that
+    were identified with it, and those that are only suspected, with what they leave."""
     words = ""
     if described:
         words = f"; the extended model has {' and '.join(described)}, which describes a part of " \
                 "it and names nothing"
     if unnamed:
         words += f"; the extended model keeps {' and '.join(unnamed)} as identified, without a name"
+    if kept:
+        words += f"; the extended model keeps {' and '.join(kept)}, which describe a part of it " \
+                 f"and are not named: {_percent(left)} of the output is left with them"
     return words
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import IdentificationError
+from ..shown import several
 
 # Samples at the extreme, at least, and how many more than at any of the next distinct values make
 # a pile, and one that is certain where values repeat. The crests of a quantised sine come to 2.4
@@ -44,17 +45,26 @@ class Clipping:
     Attributes
     ----------
     samples : ndarray of bool, shape (n,)
-    limits : tuple of float
-        Values at which the samples stand, the lower one first.
+    lower, upper : float or None
+        Values at which the samples stand.
     """
 
     samples: np.ndarray
-    limits: tuple
+    lower: float | None = None
+    upper: float | None = None
 
     @property
     def words(self):
         """Where the limits are."""
-        return " and ".join(f"{limit:.6g}" for limit in self.limits)
+        return " and ".join(f"{limit:.6g}" for limit in (self.lower, self.upper)
+                            if limit is not None)
+
+
+def at_limits(values, lower, upper):
+    """Words for the values that lie at each limit that is not None."""
+    return [several(int(np.sum(values == limit)), "sample lies", "samples lie")
+            + f" exactly at the {side} limit {limit:.6g}"
+            for limit, side in ((lower, "lower"), (upper, "upper")) if limit is not None]
 
 
 def pile_up(values):
@@ -105,17 +115,17 @@ def clipped(values, valid, step, model):
     suspect = {side: valid & (values == side * pile.limit) for side, pile in piles.items() if pile}
     none = np.zeros(len(values), bool)
     if not suspect:
-        return Clipping(none, ())
+        return Clipping(none)
     others = valid & ~np.any(list(suspect.values()), axis=0)
     try:
         expected = model(others)
     except IdentificationError:
         # what the other samples cannot tell stays unknown; the fit of all of them will say why
-        return Clipping(none, ())
+        return Clipping(none)
     least = max(_BEYOND_STEPS * (step or 0.0),
                 _BEYOND_NOISE * np.std((values - expected)[others]),
                 _BEYOND * np.std(values[valid]))
     found = {side: samples for side, samples in suspect.items()
              if np.median(side * (expected - values)[samples]) > least}
-    return Clipping(np.any([none, *found.values()], axis=0),
-                    tuple(float(values[samples][0]) for samples in found.values()))
+    limits = (float(values[found[side]][0]) if side in found else None for side in (-1, 1))
+    return Clipping(np.any([none, *found.values()], axis=0), *limits)

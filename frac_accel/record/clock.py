@@ -101,6 +101,11 @@ class Clock:
         scatter = float(np.std(seconds - (slope * slot + start)))
         return cls("regular", rate, float(np.median(place)) / rate, slot, scatter)
 
+    def instants_s(self, stamps_ns):
+        """Instants [s] of the samples with these stamps, after the first of them."""
+        if self.kind == "uneven":
+            return (stamps_ns - stamps_ns[0]) * 1e-9
+        return self.start_s + self.slot / self.rate_hz
 
     def independent_stamps(self, stamps_ns):
         """How many of its stamps scatter each for itself: one of each batch."""

@@ -68,7 +68,8 @@ class Record:
     topics : tuple of Topic, or None
         The usable samples of reference and sensor, with what can be said of each.
     since_start_s : float
-        Time [s] from the start of the whole record, of which this may be a part.
+        Time [s] from the sensor's first sample, from which drifts and steps count, to its first
+        one here.
 
     Examples
     --------
@@ -276,7 +277,8 @@ class Record:
         return cls(paired.sampling_rate_hz, paired.reference[:last], paired.sensor[:last],
                    paired.valid[:last], lag, paired.start_ns, float(std), celsius,
                    paired.band_hz, paired.resampled, offset and offset.seconds,
-                   offset and offset.std_s, taken_out, (*words, *paired.words), (one, two))
+                   offset and offset.std_s, taken_out, (*words, *paired.words), (one, two),
+                   1e-9 * (paired.start_ns - int(two.stamps_ns[0])) + lag)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import FracAccelError
 from ..shown import several
-from .clipping import certain, pile_up
+from .clipping import at_limits, certain, pile_up
 from .clock import Clock, require_span, usable
 from .lattice import lattice_step, stuck_bit
 
@@ -156,14 +156,10 @@ class Topic:
         if stuck:
             words.append(f"a bit is stuck: the one that is worth {stuck:.6g} is the same in all "
                          "values")
-        for limit, side in ((lower, "lower"), (upper, "upper")):
-            if limit is not None:
-                count = int(np.sum(self.values[:, column] == limit))
-                words.append(several(count, "sample lies", "samples lie")
-                             + f" exactly at the {side} limit {limit:.6g}")
+        words += at_limits(self.values[:, column], lower, upper)
         if not own_instants:
-            jitter, step = 0.0, None
-        return Integrity(len(self), self.missing if own_instants else 0, self.duplicates,
+            step = None
+        return Integrity(len(self), self.missing, self.duplicates,
                          self.stamps_back, self.not_finite, jitter, step, lower, upper, words)
 
     def _stamp_words(self, jitter):

@@ -36,7 +36,8 @@ _BEYOND = 8
 
 
 def simulate(model: SensorModel, reference: Any, sampling_rate_hz: float | None = None,
-             axis: str | None = None, initial: str = "rest", temperature_c: Any = None) -> Any:
+             axis: str | None = None, initial: str = "rest", temperature_c: Any = None,
+             start_time_s: float = 0.0) -> Any:
     """Output of a sensor, from the acceleration of its base.
 
     Parameters
@@ -53,6 +54,8 @@ def simulate(model: SensorModel, reference: Any, sampling_rate_hz: float | None 
         Motion before the record: none, or the first sample's value for ever (gravity).
     temperature_c : array_like, shape (n,) or (), optional
         Temperature [°C]; needed by a model with temperature_sensitivity.
+    start_time_s : float
+        Time of the first sample from the start of the record that drifts and steps count from.
 
     Returns
     -------
@@ -98,7 +101,8 @@ def simulate(model: SensorModel, reference: Any, sampling_rate_hz: float | None 
         raise FracAccelError(f"reference: shape {np.shape(reference)} given, expected (n, 3)")
     result = np.empty_like(values)
     for i, axis_model in enumerate(model.axes):
-        simulator = AxisSimulator(values[:, i], sampling_rate_hz, temperature_c, initial=initial)
+        simulator = AxisSimulator(values[:, i], sampling_rate_hz, temperature_c, start_time_s,
+                                  initial)
         result[:, i] = simulator.respond(axis_model)
     result = model.live_simulation(sampling_rate_hz)(result, simulator.circumstances)
     return result[:, column] if single else result

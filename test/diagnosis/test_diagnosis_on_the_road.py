@@ -18,11 +18,19 @@ def names(case):
     (7_160_000, "interference_bursts"),
     (7_160_000, "late_stamps"),          # beside a reference whose noise fills the band
     (7_460_000, "offset"),               # under gravity a dead zone does the same
+    (7_660_000, "clipping"),             # of so few values that they need a model to be certain
+    (7_660_000, "timestamp_jitter"),     # of stamps whose values were put on other instants
 ])
 def test_named_on_the_road(seed, cause):
     case = draw_road_case(seed, [cause])
     found, _ = names(case)
     assert case.causes <= found <= case.causes | set(case.besides)
+
+
+def test_a_zero_that_follows_the_vibration_is_no_burst_of_noise():
+    case = draw_road_case(7_690_000, ["rectification_memory"])
+    found, _ = names(case)
+    assert not found - set(case.besides)
 
 
 @pytest.mark.thorough

@@ -32,13 +32,10 @@ class DroppedSamples(Effect):
         if seen.found.missing < _SEVERAL \
                 and seen.found.jitter_rms_s * seen.record.sampling_rate_hz > _SCATTER:
             return None
-        counted = np.flatnonzero(seen.record.valid)
-        late = seen.used[counted]
         share, whole = self.fraction, seen.found.samples + seen.found.missing
-        error = seen.measured - seen.output
+        values, at_instants, as_counted = seen.as_counted()
         return Reading({"fraction": float(np.sqrt(share * (1 - share) / whole))},
-                       (seen.measured[counted] - seen.output[:len(counted)])[late],
-                       error[counted][late],
+                       values - as_counted, values - at_instants,
                        next(words for words in seen.found.words if "missing" in words))
 
     fraction: float = parameter("1", minimum=0, below=1, null=0.0)

@@ -171,7 +171,7 @@ def strongest_line(view):
     before, here, after = np.log(power[peak - 1:peak + 2] + 1e-300)
     place = peak + 0.5 * (before - after) / (before - 2 * here + after)
     frequency = place * view.rate / len(values)
-    wave = 2 * np.pi * frequency * view.time
+    wave = 2 * np.pi * frequency * (view.since_start_s + view.time)
     basis = np.stack([np.sin(wave), np.cos(wave)], axis=1) * view.used[:, None]
     sine, cosine = np.linalg.lstsq(basis, values, rcond=None)[0]
     return float(frequency), float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))

@@ -24,8 +24,10 @@ _UNRELATED = 0.15
 _AT_MOST = 0.5
 # Standard deviations by which the motion's rank in bursts may exceed that at any time.
 _DEVIATIONS = 4.0
-# Mean of the error in bursts, over its RMS there, up to which noise has it, too.
-_ONE_SIDED = 0.3
+# Mean of the error in bursts, over its RMS there, up to which noise has it, too, with the chance
+# that so many bursts have one sign; and up to which it has it where all have.
+_ONE_SIDED, _CHANCE = 0.3, 1e-3
+_ALL_ONE_SIDED = 0.6
 # Share of the error budget that bursts must have, and where one topic was put on the other's
 # instants: there it lacks what is fast of the motion.
 _SHOWN, _SHOWN_RESAMPLED = 0.01, 0.5
@@ -75,7 +77,7 @@ class InterferenceBursts(Effect):
         mostly = share * (loud - noise) > _MOSTLY * np.mean(error**2)
         if len(starts) < (_FEWEST if mostly else _SEVERAL) or _going_on(error, noise) < _GOES_ON \
                 or _follows(inside, error, output, len(starts)) \
-                or _one_sided(error, inside, len(starts)) \
+                or _one_sided(error, inside) \
                 or _grows(error, output) > _AS_GOOD * better \
                 or _repeated(seen.measured[used], inside) > _REPEATED:
             return None
@@ -168,11 +170,17 @@ def _follows(inside, error, output, count):
     return False
 
 
-def _one_sided(error, inside, count):
+def _one_sided(error, inside):
     """Whether the error in bursts has one sign: no noise, but what something else adds, such as a
-    turn about a point beside the sensor."""
+    turn about a point beside the sensor, or a zero that follows the vibration."""
+    from scipy.ndimage import label
+    from scipy.stats import binomtest
     mean = abs(np.mean(error[inside])) / np.sqrt(np.mean(error[inside]**2))
-    return mean > _ONE_SIDED + 3 / np.sqrt(count)
+    numbers, count = label(inside)
+    positive = int(np.sum(np.bincount(numbers[inside], error[inside])[1:] > 0))
+    if positive in (0, count) and mean > _ALL_ONE_SIDED:
+        return True
+    return mean > _ONE_SIDED and binomtest(positive, count).pvalue < _CHANCE
 
 
 def _grows(error, output):

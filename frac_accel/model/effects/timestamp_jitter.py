@@ -29,11 +29,8 @@ class TimestampJitter(Effect):
         words = next((words for words in seen.found.words if "scatter" in words), None)
         if words is None:
             return None
-        _, slot, values = seen.at_stamps()
-        inside = seen.used[slot]
-        slot, values = slot[inside], values[inside]
+        values, at_instants, at_stamps = seen.at_stamps()
         return Reading({"rms_s": self.rms_s / np.sqrt(2 * seen.found.samples)},
-                       seen.measured[slot] - values, (seen.measured - seen.output)[slot],
-                       words)
+                       values - at_stamps, values - at_instants, words)
 
     rms_s: float = parameter("s", minimum=0, maximum=10, null=0.0)
