@@ -60,6 +60,11 @@ _ACAUSAL = 3.0
 _ALL_MOTION, _OUT_OF_SIGHT = 0.9999, 1.2
 # Sampling intervals below which a lead is none of stamps.
 _NO_LEAD = 0.01
+# Constant of the simulated output, over an offset, from which a gain at standstill may make it.
+_OF_CONSTANT = 0.3
+# Damping ratio below which a link has a peak, and times what is left within half an octave of it
+# (RMS) that it must then take.
+_PEAKED, _AT_PEAK = 0.1, 10.0
 _MORE = ("a linear filter would take another {:.0%} of what is left: the linear causes only "
          "imitate the true response")
 # Share of what is left that changes with time from which filters may be a mean of what moves.
@@ -149,7 +154,8 @@ def by_what_is_left(engine, fitted, takes, left):
     left : Leftover
     """
     return {**_other_laws(engine, fitted, takes, left), **_elsewhen(engine, fitted, takes, left),
-            **_imitators(engine, fitted, takes, left), **_on_both_sides(engine, fitted),
+            **_imitators(engine, fitted, takes, left), **_at_standstill(engine, fitted, takes),
+            **_on_both_sides(engine, fitted),
             **_one_filter(engine, fitted), **_other_axes(engine, fitted, takes, left)}
 
 
@@ -207,8 +213,41 @@ def _imitators(engine, best, takes, left):
             _RESEMBLES if filters[odd[0]].everyday or share < _MOSTLY else _IMITATES):
         return {}
     linear = [cause for cause, effect in best.effects.items()
-              if cause in takes and (cause in filters or effect.is_constant)]
+              if cause in takes and (cause in filters or effect.is_constant)
+              and not _stands_out_at_its_peak(engine, best, cause, takes[cause])]
     return dict.fromkeys(linear, more.format(share))
+
+
+def _at_standstill(engine, best, takes):
+    """Offsets beside a constant of the reference, such as gravity, where a filter would take most
+    of what is left: its gain at standstill, another one or none, does the same."""
+    p, share = engine.problem, _linear_share(engine, best)
+    if share < _MOSTLY:
+        return {}
+    found = {}
+    for cause in takes:
+        if best.effects[cause].stage != OFFSET or not best.effects[cause].everyday:
+            continue
+        added = float(np.mean(engine.added(best, cause)[p.used]))
+        constant = float(np.mean(best.output[p.used])) - added
+        if abs(constant) > _OF_CONSTANT * abs(added):
+            found[cause] = (f"a linear filter would take {share:.0%} of what is left, and its gain "
+                            f"at standstill may make the {added:.3g} of the {constant:.3g} there")
+    return found
+
+
+def _stands_out_at_its_peak(engine, best, cause, taken):
+    """Whether a lightly damped link takes far more than all that is left around its resonance:
+    whatever filter is missing elsewhere, this peak is there."""
+    effect, p = best.effects[cause], engine.problem
+    poles = np.atleast_1d(effect.poles()) if is_link(effect) else np.zeros(0)
+    if not len(poles) or np.any(-poles.real > _PEAKED * np.abs(poles)) or not np.all(poles.imag):
+        return False
+    frequency = np.fft.rfftfreq(len(p.used), 1 / p.rate)
+    apart = np.abs(np.log2(np.maximum(frequency, 1e-300) * 2 * np.pi / np.abs(poles).min()))
+    spectrum = np.fft.rfft(best.residual * p.used)
+    there = np.fft.irfft(np.where(apart < 0.5, spectrum, 0.0), len(p.used))
+    return taken > _AT_PEAK * engine.rms(there)
 
 
 def _hardly_more(engine, best, left):

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from ..errors import FracAccelError
-from ..model.effects import IDENTIFIED, known_effects
+from ..model.effects import IDENTIFIED, Effect, known_effects
 from ..model.parameters import fixed_values
 from .problem import acts_on_spring
 from .stages import SEARCHED, Stages
@@ -37,6 +37,9 @@ _SCREENED = 6000
 _NOTHING_NEW = 1e-6
 # Share of the largest gain that is expected in a round below which a cause is not tried.
 _LITTLE = 0.25
+# Share of a set's cost below which what is promised beside a linear one leaves no sense in a search
+# beside a force or friction.
+_FAR_LESS = 0.5
 # Variances of the noise within which orders and kinds of a cause say the same.
 _TIE = 10.0
 # Variances from the best fit of a round within which a fit must come if it goes on as it goes.
@@ -353,7 +356,10 @@ class Search:
             wanted = {}
             # beside noise only by what is clear whatever the spectrum of what would be left
             least = best.cost / (1 + threshold(best) / best.cost) if done(best) else np.inf
-            for parent in beam:
+            for parent in sorted(beam, key=_is_nonlinear):
+                promised = min((cost for cost, *_ in wanted.values()), default=np.inf)
+                if _is_nonlinear(parent) and promised < _FAR_LESS * parent.cost:
+                    continue  # to screen beside a force or friction takes long
                 for cost, cause, begin in self.screen(parent):
                     key = parent.causes | {cause}
                     if promises(parent, cost) and cost < least \
@@ -399,6 +405,12 @@ class Search:
             # a filter of another order has another delay
             found = self.varied(found)
         return found
+
+
+def _is_nonlinear(fitted):
+    """Whether the motion of a fit is simulated step by step."""
+    return any(acts_on_spring(effect) or type(effect).change_motion is not Effect.change_motion
+               for effect in fitted.effects.values())
 
 
 def _varied_choice(wanted, cost):

@@ -57,7 +57,9 @@ class Clipping(Effect):
         if self._bends(measured, error, used & ~at_limit):
             return None
         resolution = (seen.found.step or 0.0) / np.sqrt(12)
-        return Reading({"lower": resolution, "upper": resolution},
+        # one that was never reached is not known
+        reached = [name for name in ("lower", "upper") if getattr(seen.found, name) is not None]
+        return Reading(dict.fromkeys(reached, resolution),
                        error, measured - self.simulate(output, None),
                        "; ".join(words for words in seen.found.words if "limit" in words),
                        evident=_goes_beyond(measured, error, at_limit, used))

@@ -2,9 +2,11 @@
 
 import dataclasses
 
+import numpy as np
+
 from ..parameters import parameter
 from .base import DELAY, Effect
-from .fit_starts import finite, free
+from .fit_starts import Start, drifting_lags, finite, free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,4 +34,7 @@ class ClockSkew(Effect):
 
     @classmethod
     def starts(cls, view):
-        return [free(cls(1.0), "skew_ppm"), finite(cls(100.0)), finite(cls(-100.0))]
+        lags = [(cls(float(np.clip(-1e6 * growth, -9e3, 9e3))), lag_s)
+                for growth, lag_s in drifting_lags(view) if growth]
+        return [free(cls(1.0), "skew_ppm"), finite(cls(100.0)), finite(cls(-100.0)),
+                *(Start(effect, (effect,), "finite", lag_s=lag_s) for effect, lag_s in lags)]

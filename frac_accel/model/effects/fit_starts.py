@@ -15,6 +15,9 @@ _LONGEST_SEGMENT = 1024
 _MOST_DELAY = 8
 # Segments of a spectrum for low frequencies, and the coherence from which on motion is common.
 _SEGMENTS, _MOSTLY = 16, 0.5
+# Segments whose lags are to lie on a line over time, the largest growth of such a lag, and parts of
+# a sample that it is told to.
+_LINES, _FASTEST_DRIFT, _FINER = 16, 2e-3, 4
 # Samples that must count on either side of an instant at which something is to have changed.
 _SIDE = 32
 # Share of a record at either end in which a change cannot be told from one that was always there.
@@ -85,6 +88,45 @@ def bulk_shift(simulated, measured, used):
                    * rfft((measured - measured[used].mean()) * used, length), length)
     lags = np.r_[0:n // 4, -(n // 4):0]
     return int(lags[np.argmax(shared[lags])])
+
+
+def drifting_lags(view):
+    """Lags that grow evenly with time, with which measured and simulated signals agree most.
+
+    The correlations of some segments, of the signals' slopes, are summed along straight lines of
+    lag over time (J. Illingworth, J. Kittler, *Comput. Vision Graph. Image Process.* 44 (1988)
+    87-116): one segment alone may agree best a period of its motion away.
+
+    Returns
+    -------
+    list of tuple of float
+        Growth of the lag [1] and lag at the record's start [s]: of lines that begin at none, and
+        of any. Empty where there are too few samples.
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+    count = len(view.measured)
+    size = count // _LINES
+    most = min(size // 3, max(4, int(_FASTEST_DRIFT * count)))
+    if most < 4:
+        return []
+    length, reach = next_fast_len(size + most, real=True), _FINER * most
+    lags = np.arange(-reach, reach + 1)
+    shared = np.zeros((_LINES, len(lags)))
+    for row, start in zip(shared, range(0, _LINES * size, size)):
+        rows = slice(start, start + size)
+        one, other = (rfft(np.diff(values[rows]) * view.used[rows][1:], length)
+                      for values in (view.simulated, view.measured))
+        row[:] = irfft(np.conj(one) * other, _FINER * length)[lags]
+    middle, found = (np.arange(_LINES) + 0.5) / _LINES, []
+    for begins in (np.zeros(1, int), lags[::_FINER]):
+        # lags of the line at the record's end
+        place = np.round(begins[:, None, None] + (lags[:, None] - begins[:, None, None]) * middle)
+        place = place.astype(int) + reach
+        total = shared[np.arange(_LINES), place].sum(-1)
+        begin, end = np.unravel_index(np.argmax(total), total.shape)
+        found.append((float((lags[end] - begins[begin]) / (_FINER * count)),
+                      float(begins[begin] / (_FINER * view.rate))))
+    return found
 
 
 def spectral_peaks(view, count=3):
