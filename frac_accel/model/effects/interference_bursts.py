@@ -26,7 +26,7 @@ _AT_MOST = 0.5
 _DEVIATIONS = 4.0
 # Mean of the error in bursts, over its RMS there, up to which noise has it, too, with the chance
 # that so many bursts have one sign; and up to which it has it where all have.
-_ONE_SIDED, _CHANCE = 0.3, 1e-3
+_ONE_SIDED, _ONE_SIGN = 0.3, 1e-3
 _ALL_ONE_SIDED = 0.6
 # Share of the error budget that bursts must have, and where one topic was put on the other's
 # instants: there it lacks what is fast of the motion.
@@ -180,7 +180,7 @@ def _one_sided(error, inside):
     positive = int(np.sum(np.bincount(numbers[inside], error[inside])[1:] > 0))
     if positive in (0, count) and mean > _ALL_ONE_SIDED:
         return True
-    return mean > _ONE_SIDED and binomtest(positive, count).pvalue < _CHANCE
+    return mean > _ONE_SIDED and binomtest(positive, count).pvalue < _ONE_SIGN
 
 
 def _grows(error, output):
