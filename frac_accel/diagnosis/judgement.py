@@ -291,7 +291,8 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         {"rmse": account.before, "nrmse": account.before / spread, "noise_rms": left.noise_rms},
         findings, suspects,
         {"rmse": after, "nrmse": after / spread},
-        _unexplained(fraction, findings, fitted, left.noise_rms), model, found,
+        _by_itself(findings, fitted, left.noise_rms, fraction) if verdict == "explained"
+        else float(min(fraction, 1.0)), model, found,
         Evidence.of(engine, best, fitted, named),
         noise.as_dict(), p.limit.summary(),
         [*engine.budget(engine.search.baseline).as_list("baseline"),
@@ -312,9 +313,9 @@ def _remaining(engine, fitted, noise_rms):
     return max(fitted.cost / count - noise_rms**2, 0.0) / excess if excess > 0 else 0.0
 
 
-def _unexplained(fraction, findings, fitted, noise_rms):
-    """Share of the error's power above the noise that is left; of what no fit counts, such as
-    samples at a limit, by what the record shows by itself."""
+def _by_itself(findings, fitted, noise_rms, fraction):
+    """Share of the error's power above the noise that is left where all is explained; where no fit
+    counts it, such as at a limit, by what the record shows by itself."""
     if findings and not any(f.cause in fitted.effects for f in findings):
         g = max((f.gain for f in findings), key=lambda g: g.before)
         after, before = (max(rms**2 - noise_rms**2, 0.0) for rms in (g.after, g.before))
