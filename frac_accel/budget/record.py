@@ -112,7 +112,7 @@ def _simulated(pair, measured, model, axis, column, temperature_at):
         celsius = None if temperature_at is None else temperature_at(instants)
         values = simulate(model, pair.reference, pair.sampling_rate_hz, initial="steady",
                           temperature_c=celsius,
-                          start_time_s=pair.since_start_s - pair.lag_s)[:, column]
+                          start_time_s=pair.start_time_s)[:, column]
         if pair.lag_s:
             place = np.arange(len(pair)) + pair.lag_s * pair.sampling_rate_hz
             values = _between(values, place)

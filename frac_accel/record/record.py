@@ -171,6 +171,11 @@ class Record:
         return float(np.linalg.norm(stds))
 
     @property
+    def start_time_s(self):
+        """Time [s] from which drifts and steps count, at the reference's first instant here."""
+        return self.since_start_s - self.lag_s
+
+    @property
     def is_reference_late(self):
         """Whether the sensor shows the motion clearly before the reference does."""
         return self.offset_s is not None and not self.taken_out_s \

@@ -253,7 +253,7 @@ def _simulated(model, pair, column, temperature_at):
     def begun(initial):
         simulated = simulate(model, pair.reference, pair.sampling_rate_hz, initial=initial,
                              temperature_c=temperature,
-                             start_time_s=pair.since_start_s - pair.lag_s)
+                             start_time_s=pair.start_time_s)
         shifted = interpolate(instants, simulated, instants + round(1e9 * pair.lag_s),
                               pair.sampling_rate_hz)[:, column]
         run = _longest_run(np.isfinite(shifted) & inside, instants, pair.sampling_rate_hz)

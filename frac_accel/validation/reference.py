@@ -52,7 +52,7 @@ def restored(reference, sensor, model, axis="x", temperature_at=None):
     if gain and any(pole == 0 for fault in model.reference_faults for pole in fault.poles()):
         celsius = temperature_at(pair.start_ns + np.round(1e9 * time)) if temperature_at else None
         output = simulate(model, values, rate, initial="steady", temperature_c=celsius,
-                          start_time_s=pair.since_start_s - pair.lag_s)[:, column]
+                          start_time_s=pair.start_time_s)[:, column]
         # the sensor's instants are later than the restored reference's
         output = np.interp(time + pair.lag_s + early_s, time, output)
         drift = np.stack([np.ones(len(time)), time / time[-1]], axis=1)
