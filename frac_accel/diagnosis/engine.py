@@ -150,8 +150,9 @@ class Engine:
                                p.in_own_core)
             self.part.identified, self.part.found = self.identified, self.found
             return self.part.run(seed)
-        self.best = self.compete(self.search.run(self.threshold, self.promises, self.noise_only,
-                                                 seed))
+        self.best = self.compete(self.search.run(
+            self.threshold, self.promises, self.noise_only, seed,
+            self._known() - set(self._unmoved(self.search.baseline))))
         return self.best
 
     def whole(self, effects):
@@ -297,17 +298,13 @@ class Engine:
         own : Effect
             What the model in use says.
         """
-        search, unmoved = self.search, {**fitted.effects, own.cause: own}
         try:
-            bare = self.problem.fit(unmoved, held=(own.cause,))
+            trials = self.search.beside_held({**fitted.effects, own.cause: own}, (own.cause,),
+                                             _RIVALS)
         except FracAccelError:
             return None
-        search.screens.pop(bare.causes, None)
-        found = search.screen(bare)[:_RIVALS]
-        trials = [(cause, search.begun(bare, cause, begin)) for _, cause, begin in found]
-        del search.screens[bare.causes]
         limit = fitted.cost * (1 - _AHEAD / self.problem.count)
-        for cause, effects in trials:
+        for _, cause, effects in trials:
             try:
                 if self.problem.fit(effects, held=(own.cause,)).cost < limit:
                     return cause
@@ -518,13 +515,18 @@ class Engine:
     def _unmoved(self, best):
         """Causes of the model in use that are free, but known, and where they are known to be: what
         another cause says must not be put on them."""
-        known = {cause: entry for cause, entry in self.loose.items()
-                 if np.isfinite([*entry.std.values()]).all()}
+        known = self._known()
         stds = self.uncertainties(best) if known else {}
-        return [cause for cause, entry in known.items() if all(
-            abs(getattr(best.effects[cause], name) - getattr(entry.effect, name))
+        return [cause for cause in known if all(
+            abs(getattr(best.effects[cause], name) - getattr(self.loose[cause].effect, name))
             < _UNMOVED * np.hypot(std, stds[cause].get(name, 0.0))
-            for name, std in entry.std.items())]
+            for name, std in self.loose[cause].std.items())]
+
+    def _known(self):
+        """Causes that are free in every fit, of which the model in use or the stamps state how far
+        they may be off."""
+        return {cause for cause, entry in self.loose.items()
+                if np.isfinite([*entry.std.values()]).all()}
 
     def unsteadiness(self, best, cause):
         """Largest deviation from 1 of a cause's strength in parts of the record.

@@ -252,6 +252,17 @@ class Search:
         self.screens[fitted.causes] = sorted(found, key=lambda entry: entry[0])
         return self.screens[fitted.causes]
 
+    def beside_held(self, effects, held, most):
+        """What promises most beside some effects of which some are held where they are: list of
+        (cost to be expected, cause, all effects to begin with)."""
+        bare = self.problem.fit(effects, held=held)
+        # what is screened beside the same causes, but free, is another question
+        self.screens.pop(bare.causes, None)
+        found = [(cost, cause, self.begun(bare, cause, begin))
+                 for cost, cause, begin in self.screen(bare)[:most]]
+        self.screens.pop(bare.causes)
+        return found
+
     def begun(self, fitted, cause, begin):
         """Effects to begin with where a cause of `screen` joins a fit."""
         start = self._starts[fitted.causes, cause]
@@ -322,7 +333,7 @@ class Search:
             effect = dataclasses.replace(effect, **{start.parameter: float(scaled)})
         return cost, cause, effect
 
-    def run(self, threshold, promises, done, seed=None):
+    def run(self, threshold, promises, done, seed=None, held=()):
         """Grow sets of causes until nothing is gained, and leave out what is not needed.
 
         Parameters
@@ -335,10 +346,16 @@ class Search:
             True for a fit that leaves nothing but noise.
         seed : dict of str to Effect, optional
             Causes to begin with, besides none.
+        held : collection of str, optional
+            What is free in every fit, but has moved farther than is likely: causes are tried
+            beside where it was, too.
         """
         bare = self.fit(self.base)
         self.stages.enter_round("looking at all causes", SEARCHED)
         seeds = [{}, seed or {}]
+        if held:
+            seeds += [effects for cost, _, effects in self.beside_held(self.base, held, _BEAM)
+                      if promises(bare, cost)]
         if not done(bare):
             seeds.append(self.everyday(bare))
         return self.prune(self.grow([begin for i, begin in enumerate(seeds) if begin or not i],

@@ -12,10 +12,12 @@ TRIALS["clipped"] = next(trial for trial in plan(61, GROUPS)
 EXACT = {
     "road_single/reference_noise/0": {"reference_noise"},
     "road_single/cross_axis_sensitivity/0": {
-        "cross_axis_sensitivity", "quantization", "reference_noise"},
+        "cross_axis_sensitivity", "dropped_samples", "quantization", "reference_noise"},
     "clipped": {"clipping"},
     "road_single/second_resonance/0": {"second_resonance", "quantization", "reference_noise"},
-    "road_single/reference_low_pass/0": {"reference_low_pass", "clock_skew"},
+    # the scatter of its stamps leaves a delay open, which does much the same
+    "road_single/reference_low_pass/0": {
+        "reference_low_pass", "clock_skew", "dropped_samples", "timestamp_jitter"},
     "road_single/linear_phase_filter/0": {
         "linear_phase_filter", "dropped_samples", "quantization", "timestamp_jitter"},
     "road_single/ac_coupling/1": {
