@@ -7,6 +7,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
+from ..model.core import Oscillator
 from ..model.effects.base import CROSS_AXIS, OFFSET, Effect
 from .engine import LONG, WEIGHS
 from .names import cancelling, undetermined
@@ -60,8 +61,12 @@ _ACAUSAL = 3.0
 _ALL_MOTION, _OUT_OF_SIGHT = 0.9999, 1.2
 # Sampling intervals below which a lead is none of stamps.
 _NO_LEAD = 0.01
+# Times the delay of a core that was identified which a lead beside it may take back.
+_TAKEN_BACK = 1.5
 # Constant of the simulated output, over an offset, from which a gain at standstill may make it.
 _OF_CONSTANT = 0.3
+# Share of that constant up to which an offset has left nothing of it.
+_CANCELLED = 0.02
 # Damping ratio below which a link has a peak, and times what is left within half an octave of it
 # (RMS) that it must then take.
 _PEAKED, _AT_PEAK = 0.1, 10.0
@@ -219,18 +224,22 @@ def _imitators(engine, best, takes, left):
 
 
 def _at_standstill(engine, best, takes):
-    """Offsets beside a constant of the reference, such as gravity, where a filter would take most
-    of what is left: its gain at standstill, another one or none, does the same."""
-    p, share = engine.problem, _linear_share(engine, best)
-    if share < _MOSTLY:
-        return {}
-    found = {}
+    """Offsets beside a constant of the reference, such as gravity, that a gain at standstill,
+    another one or none, does as well: those that leave nothing of the constant, and any where a
+    filter would take most of what is left."""
+    p, found = engine.problem, {}
     for cause in takes:
         if best.effects[cause].stage != OFFSET or not best.effects[cause].everyday:
             continue
         added = float(np.mean(engine.added(best, cause)[p.used]))
         constant = float(np.mean(best.output[p.used])) - added
-        if abs(constant) > _OF_CONSTANT * abs(added):
+        if abs(constant + added) < _CANCELLED * abs(constant):
+            found[cause] = (f"it leaves nothing of the constant {constant:.2g} that the reference "
+                            "has: AC coupling below all of the motion, or gravity that was taken "
+                            "away, does the same")
+            continue
+        share = _linear_share(engine, best)
+        if share >= _MOSTLY and abs(constant) > _OF_CONSTANT * abs(added):
             found[cause] = (f"a linear filter would take {share:.0%} of what is left, and its gain "
                             f"at standstill may make the {added:.3g} of the {constant:.3g} there")
     return found
@@ -385,9 +394,8 @@ def _beyond_the_motion(engine, best):
     p, found = engine.problem, {}
     highest = 2 * np.pi * _highest_hz(engine, best)
     seen = 2 * np.pi * min(_highest_hz(engine, best, _ALL_MOTION), _highest_seen_hz(engine, best))
-    unknown = any(entry.effect.restates_core and not np.isfinite([*entry.std.values()]).all()
-                  for entry in engine.loose.values())
-    core = np.abs(p.axis_model(best.effects).effective_core.poles()) if unknown else []
+    core = np.abs(p.axis_model(best.effects).effective_core.poles()) \
+        if _core_is_identified(engine) else []
     for cause, effect in _filters(engine, best).items():
         if not is_link(effect) or effect.of_reference or not len(effect.poles()):
             continue
@@ -491,6 +499,29 @@ def _elsewhen(engine, best, takes, left):
     return found
 
 
+def _core_is_identified(engine):
+    """Whether nobody has stated the sensor's own core: it was identified from the record itself."""
+    return any(entry.effect.restates_core and not np.isfinite([*entry.std.values()]).all()
+               for entry in engine.loose.values())
+
+
+def takes_back(engine, best, effect):
+    """Why a lead is not named that takes back no more than about the delay of a core that was
+    identified with it, or "".
+
+    A soft mount resonates as a sensor does, but does not delay slow motion: the core's delay
+    there, 2 zeta / omega_0, is all that tells one from the other well below the resonance.
+    """
+    core, lead = engine.problem.axis_model(best.effects).effective_core, -effect.pure_delay_s()
+    if lead <= 0 or effect.of_reference or not isinstance(core, Oscillator) \
+            or not _core_is_identified(engine):
+        return ""
+    own = core.damping_ratio / (np.pi * core.natural_frequency_hz)
+    return "" if lead > _TAKEN_BACK * own else (
+        f"a lead of {lead:.3g} s beside a resonance whose own delay is {own:.3g} s: a soft mount "
+        "resonates alike and does not delay")
+
+
 def _acausal(engine, best, stds):
     """Links beside a lead, which takes back what they say too much."""
     p = engine.problem
@@ -512,6 +543,10 @@ def _acausal(engine, best, stds):
         if leads:
             return dict.fromkeys([*leads, *odd], f"a lead of {-delay:.3g} s beside another core: "
                                  "no sensor has it; they imitate something else")
+    ahead = {cause: words for cause in own
+             if (words := takes_back(engine, best, best.effects[cause]))}
+    if ahead:
+        return ahead
     # the reference's delay is a lead of the sensor
     late = {cause: -effect.pure_delay_s() for cause, effect in links.items()
             if effect.of_reference and effect.pure_delay_s() < 0}

@@ -48,7 +48,7 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
              and effect.transfer_function is not Effect.transfer_function]
     own = Engine(record, column, model, used, opened(model), links, limit=limit)
     before = own.search.fit({**own.search.base, **seed})
-    before = _with_what_stands_alone(own, before)
+    before = own.search.prune(_with_what_stands_alone(own, before), own.threshold)
     seed = {cause: effect for cause, effect in before.effects.items()
             if cause in seed or cause not in own.search.base}
     flat = SensorModel(Gain(model.axes[column].core.sensitivity))
@@ -78,8 +78,9 @@ def _with_a_link(engine, fitted):
     search = engine.search
     fits = search.fit_all([search.begun(fitted, cause, begin)
                            for _, cause, begin in search.screen(fitted)[:_FITTED]], fitted.cost)
-    # one of another order may be the best
-    return sorted(map(search.varied, fits), key=lambda fit: fit.cost)
+    # one of another order may be the best, and none needs what the oscillator was identified with
+    return sorted((search.prune(search.varied(fit), engine.threshold) for fit in fits),
+                  key=lambda fit: fit.cost)
 
 
 def _with_what_stands_alone(engine, fitted):

@@ -354,8 +354,9 @@ class Search:
         self.stages.enter_round("looking at all causes", SEARCHED)
         seeds = [{}, seed or {}]
         if held:
-            seeds += [effects for cost, _, effects in self.beside_held(self.base, held, _BEAM)
-                      if promises(bare, cost)]
+            begun = self.beside_held(self.base, held, _BEAM)
+            seeds += [fit.effects for fit in self.fit_all(
+                [effects for cost, _, effects in begun if promises(bare, cost)])]
         if not done(bare):
             seeds.append(self.everyday(bare))
         return self.prune(self.grow([begin for i, begin in enumerate(seeds) if begin or not i],
