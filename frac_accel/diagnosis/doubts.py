@@ -61,6 +61,8 @@ _ACAUSAL = 3.0
 _ALL_MOTION, _OUT_OF_SIGHT = 0.9999, 1.2
 # Sampling intervals below which a lead is none of stamps.
 _NO_LEAD = 0.01
+# Times what several filters leave (RMS) up to which one other filter is as likely.
+_ANOTHER = 1.05
 # Times the delay of a core that was identified which a lead beside it may take back.
 _TAKEN_BACK = 1.5
 # Constant of the simulated output, over an offset, from which a gain at standstill may make it.
@@ -161,7 +163,8 @@ def by_what_is_left(engine, fitted, takes, left):
     return {**_other_laws(engine, fitted, takes, left), **_elsewhen(engine, fitted, takes, left),
             **_imitators(engine, fitted, takes, left), **_at_standstill(engine, fitted, takes),
             **_on_both_sides(engine, fitted),
-            **_one_filter(engine, fitted), **_other_axes(engine, fitted, takes, left)}
+            **_one_filter(engine, fitted), **_another_alone(engine, fitted),
+            **_other_axes(engine, fitted, takes, left)}
 
 
 def left_open(engine, fitted, stds, causes):
@@ -356,6 +359,27 @@ def _one_filter(engine, best):
                 together |= {cause, other}
     return dict.fromkeys(together, "the filters " + ", ".join(sorted(together))
                          + " may be parts of one of higher order")
+
+
+def _another_alone(engine, best):
+    """Filters in whose place one other filter, alone, does nearly as well: they imitate it, or
+    what is like it. Common ones are no imitators."""
+    home = engine.part or engine
+    own, base = home.search.fits.get(best.causes), home.search.base
+    filters = {cause for cause, effect in _filters(engine, best).items()
+               if is_link(effect) and not effect.everyday and cause not in base}
+    if own is None or len(filters) < 2:
+        return {}
+    for fit in home.search.fits.values():
+        other = fit.causes - best.causes
+        if len(other) == 1 and not fit.causes & filters and not fit.rough \
+                and fit.cost <= _ANOTHER**2 * own.cost:
+            (cause, effect), = ((cause, fit.effects[cause]) for cause in other)
+            if is_link(effect) and not effect.everyday:
+                more = math.sqrt(fit.cost / own.cost) - 1
+                return dict.fromkeys(filters, f"{cause} alone leaves only {more:.1%} more than "
+                                     + " and ".join(sorted(filters)))
+    return {}
 
 
 def _other_axes(engine, best, takes, left):

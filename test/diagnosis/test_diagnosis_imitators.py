@@ -1,0 +1,54 @@
+"""Two filters that imitate one which is simpler, and two that are there."""
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import bilinear, butter, lfilter, sosfilt, sosfiltfilt
+
+from frac_accel import Samples, SensorModel
+from frac_accel.diagnosis.doubts import _another_alone
+from frac_accel.diagnosis.engine import Engine
+from frac_accel.model.core import Gain
+from frac_accel.model.effects import known_effects
+from frac_accel.record import Record
+
+RATE, COUNT, FINER = 2000.0, 20_000, 16
+EFFECTS = known_effects()
+AVERAGES = EFFECTS["linear_phase_filter"](0.0004, 4)
+LOW_PASS = EFFECTS["low_pass_filter"](900.0, 8, "butterworth")
+
+
+def engine_of(sensor):
+    """Engine for a sensor with a gain of 1 in use, and what it gets at a far higher rate."""
+    rng, fine = np.random.default_rng(1), FINER * RATE
+    motion = sosfiltfilt(butter(1, [4, 150], "band", fs=fine, output="sos"),
+                         rng.normal(size=FINER * COUNT))
+    motion *= 4 / motion.std()
+    both = butter(10, 0.45 * RATE, fs=fine, output="sos")
+    stamps = np.round(np.arange(COUNT) * 1e9 / RATE).astype(np.int64)
+    pair = (Samples.of(stamps, np.outer(sosfiltfilt(both, values)[::FINER]
+                                        + rng.normal(0, 0.1, COUNT), [1, 0, 0]))
+            for values in (motion, sensor(motion, fine)))
+    record = Record.of(*pair, "x", None)
+    return Engine(record, 0, SensorModel(Gain(1.0)), record.valid)
+
+
+def doubted(engine, resonance):
+    both = engine.search.fit({effect.cause: effect for effect in (AVERAGES, resonance)})
+    engine.search.fit({LOW_PASS.cause: LOW_PASS})
+    return set(_another_alone(engine, both))
+
+
+def test_two_filters_that_one_low_pass_stands_for_are_doubted():
+    engine = engine_of(lambda motion, fine: sosfilt(
+        butter(8, RATE / 2, fs=fine, output="sos"), motion))
+    resonance = EFFECTS["second_resonance"](450.0, 0.11, 0.2)
+    assert doubted(engine, resonance) == {"linear_phase_filter", "second_resonance"}
+
+
+def test_two_filters_that_are_there_are_not():
+    omega = 2 * np.pi * 200.0
+
+    def sensor(motion, fine):
+        ringing = lfilter(*bilinear([0.3 * omega**2], [1, 0.1 * omega, omega**2], fine), motion)
+        return uniform_filter1d(0.7 * motion + ringing, 15)
+    assert not doubted(engine_of(sensor), EFFECTS["second_resonance"](200.0, 0.05, 0.3))
