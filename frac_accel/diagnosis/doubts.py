@@ -65,6 +65,9 @@ _NO_LEAD = 0.01
 _ANOTHER = 1.05
 # Times the delay of a core that was identified which a lead beside it may take back.
 _TAKEN_BACK = 1.5
+# Damping ratio from which a core has no peak, and times its own delay from which another one is
+# none of its kind.
+_NO_PEAK, _FAR_LATER = 0.8, 10.0
 # Constant of the simulated output, over an offset, from which a gain at standstill may make it.
 _OF_CONSTANT = 0.3
 # Share of that constant up to which an offset has left nothing of it.
@@ -531,16 +534,21 @@ def _core_is_identified(engine):
 
 def takes_back(engine, best, effect):
     """Why a lead is not named that takes back no more than about the delay of a core that was
-    identified with it, or "".
+    identified with it, nor a delay beside a core that has no peak, or "".
 
     A soft mount resonates as a sensor does, but does not delay slow motion: the core's delay
-    there, 2 zeta / omega_0, is all that tells one from the other well below the resonance.
+    there, 2 zeta / omega_0, is all that tells one from the other well below the resonance. And
+    without a peak a core may stand for any low-pass, each of which has a delay of its own.
     """
     core, lead = engine.problem.axis_model(best.effects).effective_core, -effect.pure_delay_s()
-    if lead <= 0 or effect.of_reference or not isinstance(core, Oscillator) \
+    if not lead or effect.of_reference or not isinstance(core, Oscillator) \
             or not _core_is_identified(engine):
         return ""
     own = core.damping_ratio / (np.pi * core.natural_frequency_hz)
+    if lead < 0:
+        return "" if core.damping_ratio < _NO_PEAK or -lead > _FAR_LATER * own else (
+            f"a delay of {-lead:.3g} s beside a core without a peak whose own is {own:.3g} s: "
+            "other filters do the same with another delay")
     return "" if lead > _TAKEN_BACK * own else (
         f"a lead of {lead:.3g} s beside a resonance whose own delay is {own:.3g} s: a soft mount "
         "resonates alike and does not delay")
