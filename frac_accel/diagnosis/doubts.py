@@ -238,8 +238,9 @@ def _at_standstill(engine, best, takes):
         if best.effects[cause].stage != OFFSET or not best.effects[cause].everyday:
             continue
         added = float(np.mean(engine.added(best, cause)[p.used]))
-        constant = float(np.mean(best.output[p.used])) - added
-        if abs(constant + added) < _CANCELLED * abs(constant):
+        left = float(np.mean(best.output[p.used]))
+        constant = left - added
+        if abs(left) < _CANCELLED * abs(constant):
             found[cause] = (f"it leaves nothing of the constant {constant:.2g} that the reference "
                             "has: AC coupling below all of the motion, or gravity that was taken "
                             "away, does the same")
@@ -377,8 +378,8 @@ def _another_alone(engine, best):
         other = fit.causes - best.causes
         if len(other) == 1 and not fit.causes & filters and not fit.rough \
                 and fit.cost <= _ANOTHER**2 * own.cost:
-            (cause, effect), = ((cause, fit.effects[cause]) for cause in other)
-            if is_link(effect) and not effect.everyday:
+            cause, = other
+            if is_link(fit.effects[cause]) and not fit.effects[cause].everyday:
                 more = math.sqrt(fit.cost / own.cost) - 1
                 return dict.fromkeys(filters, f"{cause} alone leaves only {more:.1%} more than "
                                      + " and ".join(sorted(filters)))
@@ -528,30 +529,30 @@ def _elsewhen(engine, best, takes, left):
 
 def _core_is_identified(engine):
     """Whether nobody has stated the sensor's own core: it was identified from the record itself."""
-    return any(entry.effect.restates_core and not np.isfinite([*entry.std.values()]).all()
+    return any(entry.effect.restates_core and not entry.is_known
                for entry in engine.loose.values())
 
 
-def takes_back(engine, best, effect):
-    """Why a lead is not named that takes back no more than about the delay of a core that was
-    identified with it, nor a delay beside a core that has no peak, or "".
+def within_own_delay(engine, best, effect):
+    """Why a lead or delay is not named that may be the own delay of a core which was identified
+    with it, or "".
 
     A soft mount resonates as a sensor does, but does not delay slow motion: the core's delay
     there, 2 zeta / omega_0, is all that tells one from the other well below the resonance. And
     without a peak a core may stand for any low-pass, each of which has a delay of its own.
     """
-    core, lead = engine.problem.axis_model(best.effects).effective_core, -effect.pure_delay_s()
-    if not lead or effect.of_reference or not isinstance(core, Oscillator) \
+    core, delay = engine.problem.axis_model(best.effects).effective_core, effect.pure_delay_s()
+    if not delay or effect.of_reference or not isinstance(core, Oscillator) \
             or not _core_is_identified(engine):
         return ""
     own = core.damping_ratio / (np.pi * core.natural_frequency_hz)
-    if lead < 0:
-        return "" if core.damping_ratio < _NO_PEAK or -lead > _FAR_LATER * own else (
-            f"a delay of {-lead:.3g} s beside a core without a peak whose own is {own:.3g} s: "
-            "other filters do the same with another delay")
-    return "" if lead > _TAKEN_BACK * own else (
-        f"a lead of {lead:.3g} s beside a resonance whose own delay is {own:.3g} s: a soft mount "
-        "resonates alike and does not delay")
+    if 0 > delay >= -_TAKEN_BACK * own:
+        return (f"a lead of {-delay:.3g} s beside a resonance whose own delay is {own:.3g} s: a "
+                "soft mount resonates alike and does not delay")
+    if 0 < delay <= _FAR_LATER * own and core.damping_ratio >= _NO_PEAK:
+        return (f"a delay of {delay:.3g} s beside a core without a peak whose own is {own:.3g} s: "
+                "other filters do the same with another delay")
+    return ""
 
 
 def _acausal(engine, best, stds):
@@ -576,7 +577,7 @@ def _acausal(engine, best, stds):
             return dict.fromkeys([*leads, *odd], f"a lead of {-delay:.3g} s beside another core: "
                                  "no sensor has it; they imitate something else")
     ahead = {cause: words for cause in own
-             if (words := takes_back(engine, best, best.effects[cause]))}
+             if (words := within_own_delay(engine, best, best.effects[cause]))}
     if ahead:
         return ahead
     # the reference's delay is a lead of the sensor

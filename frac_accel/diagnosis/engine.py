@@ -525,8 +525,7 @@ class Engine:
     def _known(self):
         """Causes that are free in every fit, of which the model in use or the stamps state how far
         they may be off."""
-        return {cause for cause, entry in self.loose.items()
-                if np.isfinite([*entry.std.values()]).all()}
+        return {cause for cause, entry in self.loose.items() if entry.is_known}
 
     def unsteadiness(self, best, cause):
         """Largest deviation from 1 of a cause's strength in parts of the record.

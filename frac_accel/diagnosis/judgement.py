@@ -10,7 +10,7 @@ from ..errors import FracAccelError
 from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.effects import effect_of, known_effects
-from .doubts import by_what_is_left, doubts_about, left_open, resembles, takes_back
+from .doubts import by_what_is_left, doubts_about, left_open, resembles, within_own_delay
 from .empirical import fit_empirical_link
 from .empirical_map import fit_empirical_map
 from .engine import WEIGHS
@@ -534,8 +534,9 @@ def _moved(engine, best, stds):
         g = gain(error + (best.simulated - held)[rows], error)
         if not g.is_relevant or g.taken < WEIGHS * engine.unexplained(best):
             continue
-        words = resembles(engine, best, effect, g.taken) or takes_back(engine, best, effect)
-        other = None if words or not np.isfinite([*entry.std.values()]).all() else \
+        words = resembles(engine, best, effect, g.taken) \
+            or within_own_delay(engine, best, effect)
+        other = None if words or not entry.is_known else \
             engine.instead_of_moved(best, entry.effect)
         if other:
             words = f"{other} explains more"

@@ -1,10 +1,11 @@
 """Two filters that imitate one which is simpler, and two that are there."""
 
 import numpy as np
+from sampled_pair import sampled_pair
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import bilinear, butter, lfilter, sosfilt, sosfiltfilt
 
-from frac_accel import Samples, SensorModel
+from frac_accel import SensorModel
 from frac_accel.diagnosis.doubts import _another_alone
 from frac_accel.diagnosis.engine import Engine
 from frac_accel.model.core import Gain
@@ -24,11 +25,8 @@ def engine_of(sensor):
                          rng.normal(size=FINER * COUNT))
     motion *= 4 / motion.std()
     both = butter(10, 0.45 * RATE, fs=fine, output="sos")
-    stamps = np.round(np.arange(COUNT) * 1e9 / RATE).astype(np.int64)
-    pair = (Samples.of(stamps, np.outer(sosfiltfilt(both, values)[::FINER]
-                                        + rng.normal(0, 0.1, COUNT), [1, 0, 0]))
-            for values in (motion, sensor(motion, fine)))
-    record = Record.of(*pair, "x", None)
+    signals = [sosfiltfilt(both, values) for values in (motion, sensor(motion, fine))]
+    record = Record.of(*sampled_pair(rng, signals, FINER, RATE, 0.1), "x", None)
     return Engine(record, 0, SensorModel(Gain(1.0)), record.valid)
 
 

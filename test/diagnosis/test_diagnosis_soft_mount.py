@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from sampled_pair import sampled_pair
 from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 
-from frac_accel import Samples, diagnose
+from frac_accel import diagnose
 
 RATE, COUNT, FINER = 400.0, 12_000, 32
 
@@ -18,9 +19,7 @@ def on_a_mount(rng):
     motion *= 2.0 / motion.std()
     damper = 2 * damping_ratio * omega
     felt = lfilter(*bilinear([damper, omega**2], [1, damper, omega**2], fine), motion)
-    stamps = np.round(np.arange(COUNT) * 1e9 / RATE).astype(np.int64)
-    pair = tuple(Samples.of(stamps, np.outer(values[::FINER] + rng.normal(0, 0.002, COUNT),
-                                             [1, 0, 0])) for values in (motion, felt))
+    pair = sampled_pair(rng, (motion, felt), FINER, RATE, 0.002)
     return pair, frequency_hz, damping_ratio
 
 

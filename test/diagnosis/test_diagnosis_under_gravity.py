@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from sampled_pair import sampled_pair
 from scipy.signal import butter, cheby1, sosfilt, sosfiltfilt
 
-from frac_accel import Samples, SensorModel, diagnose
+from frac_accel import SensorModel, diagnose
 from frac_accel.model.core import Gain
 
 RATE, COUNT, FINER = 200.0, 12_000, 8
@@ -17,10 +18,7 @@ def pair(seed, sensor):
     motion = rng.normal(size=FINER * COUNT)
     motion = sosfiltfilt(butter(2, [0.5, 30], "band", fs=fine, output="sos"), motion)
     motion = 9.81 + 2.0 * motion / motion.std()
-    stamps = np.round(np.arange(COUNT) * 1e9 / RATE).astype(np.int64)
-    return tuple(Samples.of(stamps, np.outer(values[::FINER] + rng.normal(0, 0.005, COUNT),
-                                             [1, 0, 0]))
-                 for values in (motion, sensor(motion, fine)))
+    return sampled_pair(rng, (motion, sensor(motion, fine)), FINER, RATE, 0.005)
 
 
 def ac_coupled(motion, rate):

@@ -89,6 +89,11 @@ class Open(NamedTuple):
     effect: object
     std: dict
 
+    @property
+    def is_known(self):
+        """Whether each parameter's uncertainty is stated."""
+        return bool(np.isfinite([*self.std.values()]).all())
+
 
 class Effect:
     """Base of all effects; a subclass is a frozen dataclass of its parameters.
