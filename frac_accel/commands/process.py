@@ -10,6 +10,8 @@ import tempfile
 import threading
 import traceback
 
+_AGAIN_S = 0.05
+
 
 class Stopped(BaseException):
     """A signal asked the process to end; ``signal`` is its number."""
@@ -34,11 +36,11 @@ def stopping_cleanly():
     def stop(number, frame):
         for each in numbers:
             signal.signal(each, signal.SIG_IGN)
-        _end_silently()
+        _end_silently(number, stop)
         raise Stopped(number)
 
     def interrupt(number, frame):
-        _end_silently()
+        _end_silently(number, interrupt)
         raise KeyboardInterrupt
 
     for number in numbers:
@@ -55,9 +57,22 @@ def stopping_cleanly():
             signal.signal(signal.SIGINT, interrupts)
 
 
-def _end_silently():
-    """What is torn down half made, such as a progress bar, has no say any more."""
-    sys.unraisablehook = lambda unraisable: None
+def _end_silently(number, handler):
+    """What is torn down half made, such as a progress bar, has no say any more.
+
+    Python drops an exception in a finalizer or a weak reference's callback. Where it is the one
+    that ends the process, the signal is sent once more, when that call is over.
+    """
+    main = threading.get_ident()
+
+    def ignore(unraisable):
+        if isinstance(unraisable.exc_value, (Stopped, KeyboardInterrupt)):
+            signal.signal(number, handler)
+            again = threading.Timer(_AGAIN_S, signal.pthread_kill, (main, number))
+            again.daemon = True
+            again.start()
+
+    sys.unraisablehook = ignore
 
 
 @contextlib.contextmanager

@@ -166,9 +166,10 @@ def stage(target):
     OSError
         If its folder cannot be written to.
     """
-    output = Output(target)
-    if _current.get() is not None:
-        _current.get().outputs.append(output)
+    with _unstopped():
+        output = Output(target)
+        if _current.get() is not None:
+            _current.get().outputs.append(output)
     return output
 
 
@@ -252,26 +253,34 @@ def sweep(folder):
                     os.close(lock)
 
 
-def _put(outputs):
-    """Rename all or none."""
+@contextlib.contextmanager
+def _unstopped():
+    """A signal that ends the process waits."""
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
-    files = [output for output in outputs if not output.to_device]
-    paths = [output.path for output in files]
     try:
-        if len(files) > 1:
-            announce(paths, [output.target for output in files])
-        for output in outputs:
-            output.put(len(outputs) == 1)
-        for output in outputs:
-            output.settle()
-    except BaseException:
-        for output in reversed(outputs):
-            output.take_back()
-        if len(files) > 1:
-            withdraw(paths)
-        raise
+        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+
+
+def _put(outputs):
+    """Rename all or none."""
+    files = [output for output in outputs if not output.to_device]
+    paths = [output.path for output in files]
+    with _unstopped():
+        try:
+            if len(files) > 1:
+                announce(paths, [output.target for output in files])
+            for output in outputs:
+                output.put(len(outputs) == 1)
+            for output in outputs:
+                output.settle()
+        except BaseException:
+            for output in reversed(outputs):
+                output.take_back()
+            if len(files) > 1:
+                withdraw(paths)
+            raise
 
 
 def _locked_folder(parent):

@@ -373,6 +373,25 @@ def test_a_stopped_command_cleans_up(place, long_bag, number, output):
     assert content(place) == before
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_a_signal_during_a_finalizer_is_not_lost(number):
+    """Python drops what is raised there."""
+    script = f"""
+import os, time
+from frac_accel.commands.process import stopping_cleanly
+class Finalized:
+    def __del__(self):
+        os.kill(os.getpid(), {int(number)})
+with stopping_cleanly():
+    Finalized()
+    time.sleep(60)
+"""
+    process = subprocess.run([sys.executable, "-c", script], env=ENVIRONMENT, timeout=50,
+                             capture_output=True, text=True)
+    assert process.returncode != 0 and "Exception ignored" not in process.stderr
+    assert ("KeyboardInterrupt" if number == signal.SIGINT else "Stopped") in process.stderr
+
+
 def test_what_a_killed_command_left_goes_with_the_next_run(place, long_bag):
     process = start(*long_bag, "o.mcap")
     wait_for(lambda: leftovers(place))
