@@ -195,8 +195,11 @@ class Watch:
             # only what follows without a gap: the longest run from the newest backwards
             stretch = [*stretch, window] if stretch and stretch[-1].stop_ns == window.start_ns \
                 else [window]
-        return tuple(_joined([getattr(window, name) for window in stretch])
-                     for name in ("reference", "sensor"))
+        joined = (_joined([getattr(window, name) for window in stretch])
+                  for name in ("reference", "sensor"))
+        # a window's samples begin before it, where the change may not have been yet
+        return tuple(_rows(samples, samples.stamps_ns >= stretch[0].start_ns)
+                     for samples in joined)
 
 
 def _worth(stretch):
