@@ -528,6 +528,9 @@ class _One:
             raw = np.array([raw[rows].sum() for rows in merged.values()])
             blocks = r.blocks.sums(np.array([reductions[rows].sum(axis=0)
                                              for rows in merged.values()]))
+            # a prediction that makes things worse takes nothing, and is not made up for by noise
+            takes = raw > 0
+            raw, blocks = raw * takes, blocks * takes[:, None]
             # last of all what none takes
             raw = np.r_[raw, 1 - raw.sum()]
             sums = r.blocks.sums(weights)

@@ -72,10 +72,13 @@ def table(left, axis):
     if budget.parts:
         lines.append(f"{'part':13}{'of what is left':>16}{'95 % interval':>18}"
                      f"{'of the output':>15}")
+    known, words = left.noise.rms, dict(WORDS)
+    if known is not None:
+        words["noise"] += f"; {known / max(budget.output_rms, 1e-300):.2%} of the output is noise"
     for entry in sorted(budget.parts, key=lambda entry: -entry["share"]):
         low, high = entry["ci95"]
         lines.append(f"{entry['part']:13}{entry['share']:>16.1%}"
                      f"{f'{low:.1%} to {high:.1%}':>18}{entry['of_output']:>15.2%}"
-                     f"   {WORDS[entry['part']]}")
+                     f"   {words[entry['part']]}")
     lines.append(left.unaccounted["words"])
     return "\n".join(lines)

@@ -96,9 +96,11 @@ def table(found, axis):
         return "\n".join(lines)
     if not found.evidence.has_temperature:
         lines.append("data: no temperature was recorded: what depends on it cannot be found")
+    nrmse = found.baseline["nrmse"]
+    of_output = f"{nrmse:.3%} of" if nrmse < 1 else f"{nrmse:.3g} times"
     lines.append(f"the model in use leaves {found.baseline['rmse']:.4g} "
-                 f"({found.baseline['nrmse']:.3%} of the output) on held-out data; noise "
-                 f"{found.baseline['noise_rms']:.4g}")
+                 f"({of_output} the output) on held-out data; "
+                 f"{found.noise_words}")
     lines += _parted(found, "baseline", "of what it leaves")
     for finding in found.findings:
         lines.append(f"{finding.cause}: {finding.effect.explanation}")
@@ -120,7 +122,6 @@ def table(found, axis):
 
 def _parted(found, of, words):
     """The error budget of one model as a line; none where there is no budget."""
-    parts = [entry for entry in found.budget if entry["of"] == of and entry["share"] >= _SHOWN]
-    parts.sort(key=lambda entry: -entry["share"])
-    listed = ", ".join(f"{entry['share']:.0%} {entry['part']}" for entry in parts)
+    shares = sorted(found.shares(of).items(), key=lambda entry: -entry[1])
+    listed = ", ".join(f"{share:.0%} {part}" for part, share in shares if share >= _SHOWN)
     return [f"{words}: {listed} (docs/budget.md)"] if listed else []

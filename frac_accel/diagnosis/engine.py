@@ -385,12 +385,15 @@ class Engine:
         return self._budget_of(fitted, self.problem.record.valid & ~self.problem.taken(hidden))
 
     def _budget_of(self, fitted, rows):
-        p = self.problem
-        residual = np.where(rows, p.measured - fitted.output, 0.0)
-        residual[:p.edge] = residual[len(residual) - p.edge:] = 0.0
+        return self.budget_between(self.problem.measured, fitted.output, rows)
+
+    def budget_between(self, measured, simulated, rows):
+        """`Budget` of what differs between two signals in some rows."""
+        edge = self.problem.edge
+        residual = np.where(rows, measured - simulated, 0.0)
+        residual[:edge] = residual[len(residual) - edge:] = 0.0
         division = self._division
-        return division.of(*(values[self._parted] for values in
-                             (residual, p.measured, fitted.output)))
+        return division.of(*(values[self._parted] for values in (residual, measured, simulated)))
 
     def structure(self, fitted):
         """Parts of what a fit leaves that are no noise: (share, part), the largest first.

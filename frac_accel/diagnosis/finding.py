@@ -5,6 +5,7 @@ import dataclasses
 from ..model.parameters import fixed_values, parameter_fields
 from ..shown import Shown
 from .evidence import Evidence
+from .words import noise_words, unpredicted
 
 
 @dataclasses.dataclass(frozen=True)
@@ -107,6 +108,23 @@ class Diagnosis(Shown):
     def __repr__(self):
         causes = ", ".join(finding.cause for finding in self.findings)
         return f"<Diagnosis: {self.verdict}{': ' if causes else ''}{causes}; {self.reason}>"
+
+    @property
+    def noise_words(self):
+        """How much of what the model in use leaves is noise."""
+        return noise_words(self.established_noise, self.baseline["noise_rms"])
+
+    def shares(self, of):
+        """Parts of what a model ("baseline" or "extended") leaves, in words, and their shares.
+
+        Of what nothing predicts only what is established is noise.
+        """
+        shares = {entry["part"]: entry["share"] for entry in self.budget if entry["of"] == of}
+        if "noise" in shares:
+            shares["noise"], shares["that nothing predicts"] = unpredicted(
+                shares["noise"], getattr(self, of)["rmse"], self.established_noise,
+                self.baseline["noise_rms"])
+        return shares
 
     def _draw(self, figure):
         if self.evidence is not None:

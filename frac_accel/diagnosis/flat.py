@@ -4,6 +4,7 @@ from ..model import SensorModel
 from ..model.core import Gain
 from ..model.effects import Effect, known_effects
 from .engine import LONG, Engine
+from .gain import gain
 from .stretches import strongest_part
 
 # Links that are fitted, and the share of an oscillator's residual power that one may leave: by
@@ -12,6 +13,10 @@ _FITTED = 6
 _FAR_LESS, _LESS = 0.1, 0.5
 # Damping ratio from which an oscillator is two lags.
 _OVERDAMPED = 1.0
+# Share of the RMS that an oscillator leaves which something else of as many parameters must take to
+# be better, and factor by which it may leave more power than an oscillator with another link, which
+# bends itself.
+_SURELY_LESS, _NEARLY_AS_GOOD = 0.015, 1.02
 # Variances of the noise within which a gain with one link describes a record as well.
 _AS_WELL = 10.0
 
@@ -62,15 +67,23 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
     enough = _FAR_LESS if model.axes[column].core.damping_ratio < _OVERDAMPED else 1.0
     found = next((fit for fit in fits if fit.cost <= enough * before.cost
                   or (fit.size < before.size and fit.cost <= as_well)), None)
-    if found is None and fits and fits[0].cost < _LESS * before.cost:
+    as_good = 1 + _AS_WELL / own.problem.count if fits and fits[0].cost < _LESS * before.cost \
+        else _NEARLY_AS_GOOD if fits and _surely_better(own, before, fits[0]) else 0.0
+    if found is None and as_good:
         # a filter may be better than an oscillator, and as good as one with another link
         found = next((fit for rival in _with_a_link(own, before)[:1] for fit in fits
-                      if fit.size < rival.size
-                      and fit.cost <= (1 + _AS_WELL / own.problem.count) * rival.cost), None)
+                      if fit.size < rival.size and fit.cost <= as_good * rival.cost), None)
     if found is None:
         return None
     return flat, {cause: effect for cause, effect in found.effects.items()
                   if cause not in engine.search.base}
+
+
+def _surely_better(engine, before, fit):
+    """Whether another description leaves clearly less than an oscillator of as many parameters."""
+    used = engine.problem.used
+    change = gain(*((engine.problem.measured - each.output)[used] for each in (before, fit)))
+    return fit.size <= before.size and change.ci95[0] > 0 and change.reduction > _SURELY_LESS
 
 
 def _with_a_link(engine, fitted):

@@ -21,6 +21,7 @@ from .gain import certainty, gain
 from .own_core import in_own_core
 from .read_off import read_off
 from .words import (
+    AS_NOISE,
     description_words,
     gain_words,
     hidden_words,
@@ -278,6 +279,9 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         effect.cause: effect for effect in described})},
                       _stated(engine.problem, fitted, after / account.spread))
     p, spread = engine.problem, account.spread
+    floor = _noise_floor(left, noise, account)
+    if verdict != "consistent" and floor < left.noise_rms:
+        fraction = _remaining(engine, fitted, floor)
     # a model that has the limits leaves nothing there
     at_limit = engine.at_limit if any(f.effect.read_off for f in findings) else None
     if p.in_own_core:
@@ -288,10 +292,11 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         + description_words([] if kept else [*described.values()], unnamed,
                             sorted(kept.keys() - fitted.causes), after / spread)
         + hidden_words(account.own, account.error),
-        {"rmse": account.before, "nrmse": account.before / spread, "noise_rms": left.noise_rms},
+        {"rmse": account.before, "nrmse": account.before / spread,
+         "noise_rms": floor or left.noise_rms},
         findings, suspects,
         {"rmse": after, "nrmse": after / spread},
-        _by_itself(findings, fitted, left.noise_rms, fraction) if verdict == "explained"
+        _by_itself(findings, fitted, floor, fraction) if verdict == "explained"
         else float(min(fraction, 1.0)), model, found,
         Evidence.of(engine, best, fitted, named),
         noise.as_dict(), p.limit.summary(),
@@ -304,6 +309,15 @@ def _stated(problem, fitted, nrmse):
     noise = noise_floor(np.where(problem.used, fitted.residual, np.nan))
     error = beyond_noise(nrmse, noise / float(np.std(problem.measured[problem.used])))
     return {"noise_std": noise, **({"model_error": error} if error else {})}
+
+
+def _noise_floor(left, noise, account):
+    """RMS of what counts as noise of what is left [output units]: what no test tells from noise,
+    unless established noise is clearly less; none where nothing shows that so much is noise."""
+    if noise.rms is None:
+        return left.noise_rms if account.accounted else 0.0
+    known = float(np.hypot(noise.rms, account.own))
+    return left.noise_rms if left.noise_rms <= AS_NOISE * known else known
 
 
 def _remaining(engine, fitted, noise_rms):

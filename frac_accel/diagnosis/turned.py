@@ -38,18 +38,30 @@ def with_turn(judged, engine, orientation):
     if effect is None:
         return judged
     after = engine.problem.errors(engine.search.baseline)
-    before = after + (turned @ orientation.rotation.T - turned)[:, axis]
+    published = (turned @ orientation.rotation.T)[:, axis]
+    simulated = engine.search.baseline.output
+    before = after + published - turned[:, axis]
     rows = engine.wanted & np.isfinite(after) & held_out(engine.record.reference[:, axis])
     g = gain(before[rows], after[rows])
     finding = Finding(
         effect, dict.fromkeys((field.name for field in parameter_fields(type(effect))),
                               orientation.angle_std_deg),
         certainty(g), [], [orientation.words, *gain_words(effect.cause, g, np.inf, [])], g)
+    # the model in use knows nothing of the turn
+    spread = float(np.std(published[rows]))
+    noise = 0.0 if judged.verdict == "undecided" else judged.baseline["noise_rms"]
+    left, was = (max(rms**2 - noise**2, 0.0)
+                 for rms in (judged.extended["rmse"], g.before))
     return dataclasses.replace(
         judged, verdict=_WITH_TURN.get(judged.verdict, judged.verdict),
         reason=f"turned into the reference's axes, {judged.reason}",
         findings=[*(f for f in judged.findings if f.cause != effect.cause), finding],
-        model=_turned_model(judged.model, effect))
+        model=_turned_model(judged.model, effect),
+        baseline={**judged.baseline, "rmse": g.before, "nrmse": g.before / spread},
+        unexplained_fraction=min(left / was, 1.0) if was else 0.0,
+        budget=[*engine.budget_between(published, simulated, engine.record.valid)
+                .as_list("baseline"),
+                *(entry for entry in judged.budget if entry["of"] == "extended")])
 
 
 def _turned_model(model, effect):

@@ -61,7 +61,7 @@ def _verdict(section, found):
     before, after = found.baseline, found.extended
     section.text(
         f"On held-out data the model in use is wrong by {before['rmse']:.4g} output units (RMS), "
-        f"{percent(before['nrmse'])} of the output; {_noise(found)}.")
+        f"{percent(before['nrmse'])} of the output; {found.noise_words}.")
     section.items(_short(finding) for finding in found.findings)
     if found.findings:
         section.text(
@@ -105,12 +105,6 @@ def _short(finding):
     return (f"{finding.cause} ({', '.join(values)}). {finding.effect.explanation} Without it the "
             f"held-out error is {finding.gain.before:.4g}, with it {finding.gain.after:.4g}: "
             f"{finding.gain.reduction:.1%} less.")
-
-
-def _noise(found):
-    noise = found.established_noise
-    return f"{noise['rms']:.4g} is noise, by {noise['by']}" if noise["by"] \
-        else f"{found.baseline['noise_rms']:.4g} may be noise"
 
 
 def _unexplained(found):

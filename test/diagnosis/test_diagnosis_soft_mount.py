@@ -5,7 +5,7 @@ import pytest
 from sampled_pair import sampled_pair
 from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 
-from frac_accel import diagnose
+from frac_accel import Samples, diagnose
 
 RATE, COUNT, FINER = 400.0, 12_000, 32
 
@@ -30,3 +30,18 @@ def test_a_soft_mount_is_no_oscillator_with_a_lead(seed):
     assert found.cause == "mounting_resonance"
     assert found.effect.frequency_hz == pytest.approx(frequency_hz, rel=1e-3)
     assert found.effect.damping_ratio == pytest.approx(damping_ratio, rel=0.01)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_delay_beside_a_soft_mount_is_whole(seed):
+    """An oscillator in place of the mount would take twice the damping ratio over the angular
+    frequency of it, which is 0.3 to 0.5 ms here."""
+    rng = np.random.default_rng(seed)
+    (reference, sensor), frequency_hz, _ = on_a_mount(rng)
+    delay_s = rng.uniform(0.5e-3, 3e-3)
+    late = Samples.of(sensor.stamps_ns + round(delay_s * 1e9), sensor.values)
+    found = {finding.cause: finding for finding in diagnose((reference, late),
+                                                            time_limit_s=60).findings}
+    assert set(found) == {"time_delay", "mounting_resonance"}
+    assert found["time_delay"].effect.delay_s == pytest.approx(delay_s, abs=2e-6)
+    assert found["mounting_resonance"].effect.frequency_hz == pytest.approx(frequency_hz, rel=1e-3)

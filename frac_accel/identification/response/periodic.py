@@ -174,7 +174,8 @@ def distortion_level(spectra, excited, silent):
     result["words"] = (
         f"nonlinear distortion of {level:.1f} dB of the excited lines{detail}, {above:.1f} dB "
         "above the noise" if found else
-        f"no nonlinear distortion above the noise, which is at {noise:.1f} dB of the excited lines")
+        f"no nonlinear distortion above the noise on the {len(silent)} lines that are not excited, "
+        f"where that is at {noise:.1f} dB of the excited lines")
     return result
 
 
