@@ -26,7 +26,7 @@ from ..simulation import AxisSimulator
 from .engine import Engine
 from .event import event
 from .finding import Diagnosis, Finding, insufficient
-from .flat import flat_instead
+from .flat import flat_instead, with_rival
 from .judgement import judge
 from .leftover import related
 from .read_off import drowned
@@ -128,10 +128,10 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     poor = _too_poor(record, column, used, model)
     if poor:
         return insufficient(poor, model, found)
-    stds, seed = _stated(model, axis) if model else {}, None
+    stds, seed, rival = _stated(model, axis) if model else {}, None, {}
     if model is None:
         stages.enter("identifying a classical model", IDENTIFIED)
-        model, stds, seed = _classical(record, axis, used, limit)
+        model, stds, seed, rival = _classical(record, axis, used, limit)
     # the common lag of the stamps is a median of scattered ones
     loose = _left_open(model.axis(axis), stds, 1.25 * found.jitter_rms_s / np.sqrt(found.samples))
     begin = functools.partial(
@@ -154,7 +154,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if engine.part is None:
         engine, best = _without_drowned(begin, engine, best, found, seed)
     stages.enter("judging what was found", JUDGED)
-    judged = judge(engine, best, found, shown, noise_std)
+    judged = with_rival(judge(engine, best, found, shown, noise_std), rival)
     if orientation:
         judged = with_turn(judged, engine, orientation)
     return dataclasses.replace(judged, screened=screened(engine)) if screening else judged
@@ -290,7 +290,8 @@ def _too_poor(record, column, used, model):
 
 def _classical(record, axis, used, limit):
     """Classical core (a gain where no resonance shows) identified from the record, what it knows
-    of it (nothing, since any cause has bent it), and the effects that it was identified with."""
+    of it (nothing, since any cause has bent it), the effects that it was identified with, and those
+    that describe the record as well with a gain."""
     from ..identification import identify
     # all that is found here is fitted anew
     record, used = strongest_part(record, AXES.index(axis), used, MOST)
@@ -301,10 +302,10 @@ def _classical(record, axis, used, limit):
     def opened(model):
         return {cause: entry.effect
                 for cause, entry in _left_open(model.axis(axis), stds, 0.0).items()}
+    rival = {}
     if isinstance(core.core, Oscillator):
-        core, seed = flat_instead(record, AXES.index(axis), used, core, opened, seed, limit) \
-            or (core, seed)
-    return core, stds, seed
+        core, seed, rival = flat_instead(record, AXES.index(axis), used, core, opened, seed, limit)
+    return core, stds, seed, rival
 
 
 def _stated_noise(samples, column):

@@ -1,8 +1,13 @@
 """Whether a record without a model is better begun with a gain than with an oscillator."""
 
+import dataclasses
+
+import numpy as np
+
 from ..model import SensorModel
 from ..model.core import Gain
 from ..model.effects import Effect, known_effects
+from ..model.parameters import parameter_fields
 from .engine import LONG, Engine
 from .gain import gain
 from .stretches import strongest_part
@@ -16,7 +21,9 @@ _OVERDAMPED = 1.0
 # Share of the RMS that an oscillator leaves which something else of as many parameters must take to
 # be better, and factor by which it may leave more power than an oscillator with another link, which
 # bends itself.
-_SURELY_LESS, _NEARLY_AS_GOOD = 0.015, 1.02
+_SURELY_LESS, _NEARLY_AS_GOOD = 0.005, 1.02
+# Standard uncertainties by which both must differ for a parameter to be as open as that.
+_OPEN_FROM = 2.0
 # Variances of the noise within which a gain with one link describes a record as well.
 _AS_WELL = 10.0
 
@@ -43,8 +50,13 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
 
     Returns
     -------
-    (SensorModel, dict of str to Effect), or None
-        With the gain, and what to begin with instead.
+    SensorModel
+        The one given, or with the gain.
+    dict of str to Effect
+        What to begin with.
+    dict of str to Effect
+        With the oscillator: what a gain with one link has instead that describes the record as
+        well; empty where none does.
     """
     if len(record) > LONG:
         record, used = strongest_part(record, column, used, LONG // 2)
@@ -52,6 +64,7 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
              if not effect.read_off and not effect.of_reference
              and effect.transfer_function is not Effect.transfer_function]
     own = Engine(record, column, model, used, opened(model), links, limit=limit)
+    given = seed
     before = own.search.fit({**own.search.base, **seed})
     before = own.search.prune(_with_what_stands_alone(own, before), own.threshold)
     seed = {cause: effect for cause, effect in before.effects.items()
@@ -67,23 +80,56 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
     enough = _FAR_LESS if model.axes[column].core.damping_ratio < _OVERDAMPED else 1.0
     found = next((fit for fit in fits if fit.cost <= enough * before.cost
                   or (fit.size < before.size and fit.cost <= as_well)), None)
+    change = _change(own, before, fits)
     as_good = 1 + _AS_WELL / own.problem.count if fits and fits[0].cost < _LESS * before.cost \
-        else _NEARLY_AS_GOOD if fits and _surely_better(own, before, fits[0]) else 0.0
+        else _NEARLY_AS_GOOD if change and change.reduction > _SURELY_LESS and change.ci95[0] > 0 \
+        else 0.0
     if found is None and as_good:
         # a filter may be better than an oscillator, and as good as one with another link
         found = next((fit for rival in _with_a_link(own, before)[:1] for fit in fits
                       if fit.size < rival.size and fit.cost <= as_good * rival.cost), None)
     if found is None:
-        return None
+        return model, given, fits[0].effects if change and change.ci95[1] >= 0 else {}
     return flat, {cause: effect for cause, effect in found.effects.items()
-                  if cause not in engine.search.base}
+                  if cause not in engine.search.base}, {}
 
 
-def _surely_better(engine, before, fit):
-    """Whether another description leaves clearly less than an oscillator of as many parameters."""
+def _change(engine, before, fits):
+    """`Gain` of the best of other fits over an oscillator, if it has no more parameters."""
+    if not fits or fits[0].size > before.size:
+        return None
     used = engine.problem.used
-    change = gain(*((engine.problem.measured - each.output)[used] for each in (before, fit)))
-    return fit.size <= before.size and change.ci95[0] > 0 and change.reduction > _SURELY_LESS
+    return gain(*((engine.problem.measured - each.output)[used] for each in (before, fits[0])))
+
+
+def with_rival(judged, rival):
+    """A diagnosis whose parameters are as uncertain as what says the same makes them.
+
+    A resonance of the sensor and one of its mount have another delay: where the record does not
+    tell them apart, it may be either. Both ends of a uniform distribution (JCGM 100:2008, 4.3.7).
+
+    Parameters
+    ----------
+    judged : Diagnosis
+    rival : dict of str to Effect
+        As from `flat_instead`.
+    """
+    return dataclasses.replace(judged, findings=[
+        _as_open(finding, rival[finding.cause], sorted(rival.keys() - {finding.cause}))
+        if finding.cause in rival else finding for finding in judged.findings])
+
+
+def _as_open(finding, other, beside):
+    std, words = dict(finding.std), []
+    for field in parameter_fields(type(finding.effect)):
+        name, here = field.name, getattr(finding.effect, field.name)
+        away = abs(getattr(other, name) - here) if name in std else 0.0
+        if away > _OPEN_FROM * std.get(name, np.inf):
+            std[name] = float(np.hypot(std[name], away / np.sqrt(3)))
+            words.append(f"{name} is {getattr(other, name):.4g} {field.metadata['unit']} with "
+                         f"{' and '.join(beside)} in place of the sensor's own resonance, which "
+                         "describes the record as well")
+    return dataclasses.replace(finding, std=std, evidence=[*finding.evidence, *words])
 
 
 def _with_a_link(engine, fitted):

@@ -6,6 +6,8 @@ from sampled_pair import sampled_pair
 from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 
 from frac_accel import Samples, diagnose
+from frac_accel.diagnosis.flat import with_rival
+from frac_accel.model.effects import known_effects
 
 RATE, COUNT, FINER = 400.0, 12_000, 32
 
@@ -45,3 +47,28 @@ def test_a_delay_beside_a_soft_mount_is_whole(seed):
     assert set(found) == {"time_delay", "mounting_resonance"}
     assert found["time_delay"].effect.delay_s == pytest.approx(delay_s, abs=2e-6)
     assert found["mounting_resonance"].effect.frequency_hz == pytest.approx(frequency_hz, rel=1e-3)
+
+
+def test_a_delay_is_as_uncertain_as_what_describes_the_record_as_well_makes_it():
+    """Where a mount and the sensor's own resonance cannot be told apart, each has its delay."""
+    rng = np.random.default_rng(3)
+    found = diagnose(delayed_pair(rng, 2e-3), time_limit_s=60)
+    named, = found.findings
+    assert named.cause == "time_delay"
+    causes = known_effects()
+    mount = causes["mounting_resonance"](197.0, 0.2)
+    open_one, = with_rival(found, {"time_delay": causes["time_delay"](2.3e-3),
+                                   "mounting_resonance": mount}).findings
+    away = 2.3e-3 - named.effect.delay_s
+    assert open_one.std["delay_s"] == pytest.approx(away / np.sqrt(3), rel=1e-3)
+    assert "mounting_resonance" in open_one.evidence[-1]
+    same, = with_rival(found, {"time_delay": named.effect, "mounting_resonance": mount}).findings
+    assert same.std == named.std and same.evidence == named.evidence
+
+
+def delayed_pair(rng, delay_s):
+    """Reference, and a flat sensor that is late."""
+    motion = sosfiltfilt(butter(2, [2, 60], "band", fs=FINER * RATE, output="sos"),
+                         rng.normal(size=FINER * 4000))
+    reference, sensor = sampled_pair(rng, (motion, motion), FINER, RATE, 0.002 * motion.std())
+    return reference, Samples.of(sensor.stamps_ns + round(delay_s * 1e9), sensor.values)
