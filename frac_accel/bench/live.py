@@ -280,7 +280,8 @@ def _environment():
     profile = _ROOT / "config" / "fastdds_discovery.xml"
     discovery = {"FASTRTPS_DEFAULT_PROFILES_FILE": str(profile)} if profile.is_file() else {}
     # a domain of its own, beyond those that anybody sets by hand and below the ephemeral ports
-    return {**discovery, **os.environ, "PYTHONPATH": path,
+    # nothing is imported from the folder for temporary files, where anybody may write
+    return {**discovery, **os.environ, "PYTHONPATH": path, "PYTHONSAFEPATH": "1",
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "ROS_DOMAIN_ID": str(80 + os.getpid() % 20)}
 
