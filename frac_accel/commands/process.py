@@ -10,6 +10,7 @@ import tempfile
 import threading
 import traceback
 
+# Time [s] after which a signal comes again that Python dropped: then that call is over.
 _AGAIN_S = 0.05
 
 
@@ -63,12 +64,11 @@ def _end_silently(number, handler):
     Python drops an exception in a finalizer or a weak reference's callback. Where it is the one
     that ends the process, the signal is sent once more, when that call is over.
     """
-    main = threading.get_ident()
-
     def ignore(unraisable):
         if isinstance(unraisable.exc_value, (Stopped, KeyboardInterrupt)):
             signal.signal(number, handler)
-            again = threading.Timer(_AGAIN_S, signal.pthread_kill, (main, number))
+            again = threading.Timer(_AGAIN_S, signal.pthread_kill,
+                                    (threading.main_thread().ident, number))
             again.daemon = True
             again.start()
 

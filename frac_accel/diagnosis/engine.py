@@ -379,13 +379,11 @@ class Engine:
 
     def budget(self, fitted, hidden=None):
         """`Budget` of what a fit leaves, of all samples that are there but those of a mask."""
+        p, valid = self.problem, self.problem.record.valid
         if hidden is None or not hidden.any():
             return _once(self._budgets, fitted,
-                         lambda fitted: self._budget_of(fitted, self.problem.record.valid))
-        return self._budget_of(fitted, self.problem.record.valid & ~self.problem.taken(hidden))
-
-    def _budget_of(self, fitted, rows):
-        return self.budget_between(self.problem.measured, fitted.output, rows)
+                         lambda fitted: self.budget_between(p.measured, fitted.output, valid))
+        return self.budget_between(p.measured, fitted.output, valid & ~p.taken(hidden))
 
     def budget_between(self, measured, simulated, rows):
         """`Budget` of what differs between two signals in some rows."""

@@ -5,7 +5,7 @@ import dataclasses
 from ..model.parameters import fixed_values, parameter_fields
 from ..shown import Shown
 from .evidence import Evidence
-from .words import noise_words, unpredicted
+from .words import AS_NOISE
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,7 +112,9 @@ class Diagnosis(Shown):
     @property
     def noise_words(self):
         """How much of what the model in use leaves is noise."""
-        return noise_words(self.established_noise, self.baseline["noise_rms"])
+        known = self.established_noise
+        return f"{known['rms']:.4g} is noise, by {known['by']}" if known["by"] \
+            else f"{self.baseline['noise_rms']:.4g} may be noise"
 
     def shares(self, of):
         """Parts of what a model ("baseline" or "extended") leaves, in words, and their shares.
@@ -120,10 +122,11 @@ class Diagnosis(Shown):
         Of what nothing predicts only what is established is noise.
         """
         shares = {entry["part"]: entry["share"] for entry in self.budget if entry["of"] == of}
-        if "noise" in shares:
-            shares["noise"], shares["that nothing predicts"] = unpredicted(
-                shares["noise"], getattr(self, of)["rmse"], self.established_noise,
-                self.baseline["noise_rms"])
+        open_share, rmse = shares.get("noise", 0.0), getattr(self, of)["rmse"]
+        noise = min(open_share, (self.baseline["noise_rms"] / rmse)**2) \
+            if self.established_noise["by"] and rmse > 0 else 0.0
+        if open_share > AS_NOISE**2 * noise:
+            shares |= {"noise": noise, "that nothing predicts": open_share - noise}
         return shares
 
     def _draw(self, figure):

@@ -64,34 +64,43 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
              if not effect.read_off and not effect.of_reference
              and effect.transfer_function is not Effect.transfer_function]
     own = Engine(record, column, model, used, opened(model), links, limit=limit)
-    given = seed
     before = own.search.fit({**own.search.base, **seed})
     before = own.search.prune(_with_what_stands_alone(own, before), own.threshold)
-    seed = {cause: effect for cause, effect in before.effects.items()
-            if cause in seed or cause not in own.search.base}
+    beside = {cause: effect for cause, effect in before.effects.items()
+              if cause in seed or cause not in own.search.base}
     flat = SensorModel(Gain(model.axes[column].core.sensitivity))
     engine = Engine(record, column, flat, used, opened(flat),
                     [cause for cause in links if known_effects()[cause].acts_on(flat.core)],
                     limit=limit)
-    fits = _with_a_link(engine, engine.search.fit({**engine.search.base, **seed}))
+    fits = _with_a_link(engine, engine.search.fit({**engine.search.base, **beside}))
     # as well with fewer parameters is better
     as_well = (1 + _AS_WELL / own.problem.count) * before.cost
     # without a resonance two lags are no oscillator: what else says as much is as likely
     enough = _FAR_LESS if model.axes[column].core.damping_ratio < _OVERDAMPED else 1.0
     found = next((fit for fit in fits if fit.cost <= enough * before.cost
                   or (fit.size < before.size and fit.cost <= as_well)), None)
-    change = _change(own, before, fits)
-    as_good = 1 + _AS_WELL / own.problem.count if fits and fits[0].cost < _LESS * before.cost \
-        else _NEARLY_AS_GOOD if change and change.reduction > _SURELY_LESS and change.ci95[0] > 0 \
-        else 0.0
-    if found is None and as_good:
-        # a filter may be better than an oscillator, and as good as one with another link
-        found = next((fit for rival in _with_a_link(own, before)[:1] for fit in fits
-                      if fit.size < rival.size and fit.cost <= as_good * rival.cost), None)
+    rival = {}
     if found is None:
-        return model, given, fits[0].effects if change and change.ci95[1] >= 0 else {}
+        found, rival = _or_with_a_link(own, before, fits)
+    if found is None:
+        return model, seed, rival
     return flat, {cause: effect for cause, effect in found.effects.items()
                   if cause not in engine.search.base}, {}
+
+
+def _or_with_a_link(own, before, fits):
+    """The fit that is better than an oscillator and as good as one with another link, if any; and
+    the effects of the one that describes the record as well, if any."""
+    change = _change(own, before, fits)
+    as_good = 0.0
+    if fits and fits[0].cost < _LESS * before.cost:
+        as_good = 1 + _AS_WELL / own.problem.count
+    elif change and change.reduction > _SURELY_LESS and change.ci95[0] > 0:
+        as_good = _NEARLY_AS_GOOD
+    found = next((fit for other in (_with_a_link(own, before)[:1] if as_good else ())
+                  for fit in fits
+                  if fit.size < other.size and fit.cost <= as_good * other.cost), None)
+    return found, fits[0].effects if change and change.ci95[1] >= 0 else {}
 
 
 def _change(engine, before, fits):

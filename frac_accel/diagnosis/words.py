@@ -57,27 +57,6 @@ def reason_of(verdict, nrmse, noise, accounted, strange):
                          "noise (--noise-std)"}[verdict]
 
 
-def noise_words(established, may_be):
-    """How much is noise: what is established (``rms`` and ``by``), or what may be noise."""
-    return f"{established['rms']:.4g} is noise, by {established['by']}" if established["by"] \
-        else f"{may_be:.4g} may be noise"
-
-
-def unpredicted(share, rmse, established, noise_rms):
-    """Of the share of an error's power that nothing predicts: what is noise, and what is open.
-
-    Parameters
-    ----------
-    share : float
-    rmse, noise_rms : float
-        Of the error, and of what counts as noise [output units].
-    established : dict
-        ``by``: what shows the noise, or None.
-    """
-    noise = min(share, (noise_rms / rmse)**2) if established["by"] and rmse > 0 else 0.0
-    return (share, 0.0) if share <= AS_NOISE**2 * noise else (noise, share - noise)
-
-
 def _percent(share):
     return f"{share:.2%}" if share >= _SHOWN else f"less than {_SHOWN:.2%}"
 
