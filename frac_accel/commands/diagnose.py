@@ -13,6 +13,7 @@ from ._common import (
     open_bag,
     positive,
     provenance,
+    read_temperature_at,
     require_report,
     share_done,
     write_json,
@@ -74,17 +75,39 @@ def run(arguments):
     command = f"frac_accel diagnose {arguments.bag} --axis {arguments.axis}" + (
         f" --model {arguments.model}" if arguments.model else "")
     source = provenance(arguments.bag, command)
+    result = found.as_dict(arguments.extended_model)
     if arguments.extended_model and found.model is not None:
         found.model.metadata["provenance"] = source
         found.model.save(arguments.extended_model)
-        say(f"{arguments.extended_model}: written")
+        validated = _validated(found.model, arguments, reader)
+        result["extended"]["validated_nrmse"] = validated
+        say(f"{arguments.extended_model}: written" + (
+            f"; validate finds that it leaves {validated:.3%} of the whole record's output"
+            if validated is not None else ""))
     if arguments.report:
         from ..report.diagnosis import diagnosis_page
         page = diagnosis_page(found, source)
         page.write(arguments.report)
         source = page.provenance
         say(f"{arguments.report}: written")
-    write_json(arguments.json, {**found.as_dict(arguments.extended_model), "provenance": source})
+    write_json(arguments.json, {**result, "provenance": source})
+
+
+def _validated(model, arguments, reader):
+    """NRMSE of the whole record that `validate` gives of a model as its file has it; None where it
+    gives none."""
+    from ..errors import FracAccelError
+    from ..io.bag import read_bag
+    from ..model import SensorModel
+    from ..validation import whole_nrmse
+    model = SensorModel.from_dict(model.to_dict())
+    topics = read_bag(arguments.bag, [arguments.reference, arguments.sensor])
+    try:
+        return whole_nrmse(
+            (topics[arguments.reference], topics[arguments.sensor]), model, arguments.axis,
+            read_temperature_at(reader, arguments.temperature) if model.needs_temperature else None)
+    except FracAccelError:
+        return None  # validate says why
 
 
 def table(found, axis):

@@ -85,7 +85,9 @@ def _page(result, model, arguments):
 
 def table(result, axis):
     """Metrics as text."""
-    signals = [("simulated against measured output", result.simulation),
+    signals = [("simulated against measured output"
+                + (", turned into the reference's axes" if result.turned else ""),
+                result.simulation),
                ("raw / sensitivity against reference", result.comparison.scaled),
                ("corrected against reference", result.comparison.corrected)]
     lines = []

@@ -275,9 +275,9 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         described, after = _described(engine, fitted, after, {part for _, part in strange})
         kept, after = _kept(engine, fitted, widest, after)
     named = {f.cause: f.effect for f in findings}
-    model = _extended(engine, {**fitted.effects, **named, **(kept or {
-        effect.cause: effect for effect in described})},
-                      _stated(engine.problem, fitted, after / account.spread))
+    effects, late = _of_reference(engine, {**fitted.effects, **named, **(kept or {
+        effect.cause: effect for effect in described})}, named)
+    model = _extended(engine, effects, _stated(engine.problem, fitted, after / account.spread))
     p, spread = engine.problem, account.spread
     floor = _noise_floor(left, noise, account)
     if verdict != "consistent" and floor < left.noise_rms:
@@ -291,7 +291,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         + set_aside(engine.aside, engine.drowned, engine.record.valid)
         + description_words([] if kept else [*described.values()], unnamed,
                             sorted(kept.keys() - fitted.causes), after / spread)
-        + hidden_words(account.own, account.error),
+        + hidden_words(account.own, account.error) + late,
         {"rmse": account.before, "nrmse": account.before / spread,
          "noise_rms": floor or left.noise_rms},
         findings, suspects,
@@ -504,6 +504,20 @@ def _kept(engine, fitted, widest, after):
             or max(error, _rms(errors[1], slice(None))) > _CLEARLY * after:
         return {}, after
     return wider.effects, error
+
+
+def _of_reference(engine, effects, named):
+    """Effects in which what no sensor can do is the reference's, where that is late by the record
+    itself and nothing names it; and words."""
+    words = ""
+    for cls in known_effects().values() if engine.problem.record.is_reference_late else ():
+        effect = cls.mirrored(effects[cls.mirrors]) if cls.mirrors in effects else None
+        if effect is not None and cls.mirrors not in named:
+            effects = {cause: e for cause, e in effects.items() if cause != cls.mirrors} \
+                | {cls.cause: effect}
+            words += f"; what the sensor shows too early stands in the model as {cls.cause}, so " \
+                "that nothing is taken out of its stamps"
+    return effects, words
 
 
 def _extended(engine, effects, stated):

@@ -6,7 +6,6 @@ import numpy as np
 
 from ..model import AXES, AxisModel, SensorModel
 from ..model.effects import known_effects
-from ..model.parameters import parameter_fields
 from .engine import held_out
 from .finding import Finding
 from .gain import certainty, gain
@@ -40,13 +39,14 @@ def with_turn(judged, engine, orientation):
     after = engine.problem.errors(engine.search.baseline)
     published = (turned @ orientation.rotation.T)[:, axis]
     simulated = engine.search.baseline.output
-    before = after + published - turned[:, axis]
     rows = engine.wanted & np.isfinite(after) & held_out(engine.record.reference[:, axis])
+    # gravity, which a reference may not show, says nothing of a turn
+    published = published - np.mean((published - turned[:, axis])[rows])
+    before = after + published - turned[:, axis]
     g = gain(before[rows], after[rows])
     finding = Finding(
-        effect, dict.fromkeys((field.name for field in parameter_fields(type(effect))),
-                              orientation.angle_std_deg),
-        certainty(g), [], [orientation.words, *gain_words(effect.cause, g, np.inf, [])], g)
+        effect, effect.std_of_turn(orientation.angle_std_deg), certainty(g), [],
+        [orientation.words, *gain_words(effect.cause, g, np.inf, [])], g)
     # the model in use knows nothing of the turn
     spread = float(np.std(published[rows]))
     noise = 0.0 if judged.verdict == "undecided" else judged.baseline["noise_rms"]

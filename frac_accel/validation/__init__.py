@@ -11,6 +11,7 @@ from ..errors import FracAccelError
 from ..identification.response.excitation import excited_band
 from ..io.samples import Samples
 from ..model import AXES, SensorModel
+from ..model.effects.axis_mixing import turn_back
 from ..record import Record
 from ..record.sources import pair_of
 from ..shown import Shown, above
@@ -56,7 +57,10 @@ class Validation(Shown):
     Attributes
     ----------
     simulation : ErrorMetrics
-        Of the simulated against the measured output.
+        Of the simulated against the measured output; of a sensor that its model says lies turned,
+        of both turned into the reference's axes.
+    turned : bool
+        Whether they were.
     comparison : Comparison
         Of raw and corrected samples against the reference.
     filters : dict
@@ -76,6 +80,7 @@ class Validation(Shown):
     counters: dict
     words: tuple = ()
     whole_nrmse: float = float("nan")
+    turned: bool = False
 
     def __repr__(self):
         return (f"<Validation: simulation {self.simulation.total.nrmse:.3%}, correction "
@@ -97,6 +102,7 @@ class Validation(Shown):
     def as_dict(self):
         """Plain numbers, without the compared signals."""
         return {"simulation": self.simulation.as_dict(), "whole_nrmse": self.whole_nrmse,
+                "turned": self.turned,
                 **{name: getattr(self.comparison, name).as_dict()
                    for name in ("raw", "scaled", "corrected")},
                 "filters": self.filters, "counters": self.counters, "words": list(self.words)}
@@ -137,9 +143,8 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     >>> judged.simulation.total.nrmse > 0.1  # the model in use lacks two effects
     True
     """
-    reference, sensor = pair_of(source, sampling_rate_hz, axis)
-    reference = restored(reference, sensor, model, axis, temperature_at)
-    pair = Record.of(reference, sensor, axis)
+    reference, sensor, pair, turned, measured, simulated = _simulated_of(
+        source, model, axis, temperature_at, sampling_rate_hz)
     corrector = Corrector(model, **wishes)
     parts, taken = zip(*_corrected(corrector, sensor, temperature_at))
     stamps, values, variance = (np.concatenate([getattr(part, name) for part in parts])
@@ -154,12 +159,34 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     comparison = compare(reference, seen, Samples.of(stamps, values, variance),
                          corrector.design, axis)
     bands = [band.band_hz for band in comparison.corrected.bands]
-    measured, simulated = _simulated(model, pair, AXES.index(axis), temperature_at)
     return Validation(
         simulation=error_metrics(measured, simulated, pair.sampling_rate_hz, bands),
         comparison=comparison, filters=corrector.design.summary(), counters=corrector.counters,
         words=pair.words,
-        whole_nrmse=float(np.sqrt(np.mean((measured - simulated)**2)) / np.std(measured)))
+        whole_nrmse=_nrmse(measured, simulated), turned=turned)
+
+
+def whole_nrmse(source, model, axis="x", temperature_at=None):
+    """`Validation.whole_nrmse` alone: no correction is designed for it.
+
+    Parameters and errors as those of `validate`.
+    """
+    return _nrmse(*_simulated_of(source, model, axis, temperature_at)[-2:])
+
+
+def _nrmse(measured, simulated):
+    return float(np.sqrt(np.mean((measured - simulated)**2)) / np.std(measured))
+
+
+def _simulated_of(source, model, axis, temperature_at, sampling_rate_hz=None):
+    """Restored reference, sensor, their `Record`, whether the signals were turned, and measured
+    and simulated output."""
+    reference, sensor = pair_of(source, sampling_rate_hz, axis)
+    reference = restored(reference, sensor, model, axis, temperature_at)
+    pair = Record.of(reference, sensor, axis)
+    back = turn_back(model.axes, AXES.index(axis))
+    return reference, sensor, pair, back is not None, *_simulated(
+        model, pair, AXES.index(axis), temperature_at, back)
 
 
 def compare(reference, sensor, corrected, design, axis="x"):
@@ -239,8 +266,10 @@ def _corrected(corrector, sensor, temperature_at):
     yield corrector.finish(), corrector.taken
 
 
-def _simulated(model, pair, column, temperature_at):
-    """Measured and simulated output at the same instants."""
+def _simulated(model, pair, column, temperature_at, back):
+    """Measured and simulated output at the same instants; of a turned sensor turned `back`."""
+    rows = np.eye(3)[column] if back is None else back[column]
+    measured = pair.sensor @ rows
     temperature = None
     if temperature_at is not None:
         seconds = pair.taken_out_s + np.arange(len(pair)) / pair.sampling_rate_hz
@@ -255,9 +284,9 @@ def _simulated(model, pair, column, temperature_at):
                              temperature_c=temperature,
                              start_time_s=pair.start_time_s)
         shifted = interpolate(instants, simulated, instants + round(1e9 * pair.lag_s),
-                              pair.sampling_rate_hz)[:, column]
+                              pair.sampling_rate_hz) @ rows
         run = _longest_run(np.isfinite(shifted) & inside, instants, pair.sampling_rate_hz)
-        return pair.sensor[run, column], shifted[run]
+        return measured[run], shifted[run]
     # how it moved before the record is not known: a free mass does not move on by itself
     return min((begun(initial) for initial in ("steady", "rest")),
                key=lambda both: np.mean(np.square(both[0] - both[1])))

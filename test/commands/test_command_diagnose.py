@@ -119,6 +119,9 @@ def test_extended_model_simulates_the_record(files, tmp_path):
     extended, simulated = str(tmp_path / "e.yaml"), str(tmp_path / "s.mcap")
     said = diagnose(tmp_path, source, model, "--extended-model", extended)
     assert said["extended"]["model"] == extended
+    assert main(["validate", source, "--model", extended, "--json", str(tmp_path / "v.json")]) == 0
+    judged = json.loads((tmp_path / "v.json").read_text())
+    assert said["extended"]["validated_nrmse"] == pytest.approx(judged["whole_nrmse"], rel=1e-9)
     effect, = SensorModel.load(extended).axis("x").effects
     found = said["findings"][0]["parameters"]
     assert effect.frequency_hz == found["frequency_hz"]["value"]

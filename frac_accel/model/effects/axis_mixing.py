@@ -2,6 +2,11 @@
 
 import numpy as np
 
+from .base import CROSS_AXIS
+
+# Share of its own axis of the reference from which on an axis does not follow another one.
+_OWN = 0.5
+
 
 def mixing_matrix(by_axis):
     """3 by 3 matrix of the shares of all axes in each, from the effect of each axis that has one.
@@ -14,6 +19,23 @@ def mixing_matrix(by_axis):
     for axis, effect in by_axis.items():
         matrix[axis] = effect.share_of_axes(axis)
     return matrix
+
+
+def turn_back(axes, axis):
+    """Matrix that turns samples of three axes into the reference's, where one axis is, by its
+    effects, mostly another one of the reference or the opposite of its own; otherwise None.
+
+    Parameters
+    ----------
+    axes : sequence of AxisModel
+    axis : {0, 1, 2}
+    """
+    matrix = np.eye(3)
+    for effect in axes[axis].effects:
+        if effect.stage == CROSS_AXIS:
+            matrix = np.stack([effect.share_of_axes(i) for i in range(3)]) @ matrix
+    astray = matrix[axis, axis] < _OWN and np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6)
+    return matrix.T if astray else None
 
 
 def mix(values, matrix):

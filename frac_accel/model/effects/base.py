@@ -187,6 +187,16 @@ class Effect:
         """
         return None
 
+    def std_of_turn(self, angle_std_deg):
+        """Standard uncertainties by parameter of an effect of `of_turn`.
+
+        Parameters
+        ----------
+        angle_std_deg : float
+            Of the rotation, about any axis [degree].
+        """
+        return {}
+
     def alternatives(self):
         """Effects of this cause to go on from that differ in what no fit varies, such as an order.
 

@@ -13,8 +13,12 @@ from .fit_starts import finite
 _AXES = "xyz"
 # Share of an axis that counts as the whole, for words.
 _WHOLE = 0.97
-# Cosine of the pitch below which roll and yaw turn about the same axis.
-_UPRIGHT = 0.02
+# Cosine of the pitch below which roll and yaw turn about the same axis, and below which they nearly
+# do: less than rounding, and a tenth.
+_SAME_AXIS = 1e-6
+_NEARLY_SAME_AXIS = 0.1
+# Standard uncertainty [degree] of an angle of which nothing is known.
+_ANY_ANGLE_DEG = 360 / np.sqrt(12)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,24 +48,32 @@ class Misalignment(Effect):
     def __post_init__(self):
         words = [words for words in map(self.in_words, range(3)) if words]
         if words:
+            nearly = bool(abs(np.cos(np.radians(self.pitch_deg))) < _NEARLY_SAME_AXIS)
             # frozen: said once, of this turn
             object.__setattr__(self, "explanation", f"{type(self).explanation[:-1]}: "
-                               f"{', '.join(words)}.")
+                               f"{', '.join(words)}." + nearly * (
+                " With so much pitch, roll and yaw turn about nearly the same axis: only together "
+                "are they known."))
 
     @classmethod
     def of_turn(cls, rotation, beside=None):
         """Angles of a rotation; None of a mirrored sensor. Where x and z turn about the same axis
-        (a pitch of a quarter turn), the roll is 0."""
+        (a pitch of exactly a quarter turn), the roll is 0."""
         if np.linalg.det(rotation) < 0:
             return None
         turn = (beside or cls()).rotation @ rotation.T
         upright = np.hypot(turn[0, 0], turn[1, 0])
         pitch = np.arctan2(-turn[2, 0], upright)
-        if upright < _UPRIGHT:
+        if upright < _SAME_AXIS:
             roll, yaw = 0.0, np.arctan2(-turn[0, 1], turn[1, 1])
         else:
             roll, yaw = np.arctan2(turn[2, 1], turn[2, 2]), np.arctan2(turn[1, 0], turn[0, 0])
         return cls(*(float(angle) for angle in np.degrees([roll, pitch, yaw])))
+
+    def std_of_turn(self, angle_std_deg):
+        upright = max(abs(np.cos(np.radians(self.pitch_deg))), _SAME_AXIS)
+        about_x_and_z = min(angle_std_deg / upright, _ANY_ANGLE_DEG)
+        return {"roll_deg": about_x_and_z, "pitch_deg": angle_std_deg, "yaw_deg": about_x_and_z}
 
     @property
     def rotation(self):

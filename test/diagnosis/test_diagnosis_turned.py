@@ -1,0 +1,63 @@
+"""A sensor that lies turned: what is claimed of the signal that was turned back, the written model
+gives again, and a late reference takes nothing out of the sensor's stamps."""
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
+
+from frac_accel import Samples, SensorModel, correct, diagnose, validate
+
+RATE, GRAVITY, SECONDS = 10.0, 9.81, 400
+# The vertical of the car is nearly the sensor's x: there roll and yaw are one angle.
+QUARTER = np.array([[0.0, 0, 1], [0, -1, 0], [1, 0, 0]])
+
+
+def drive(seed, late_s, left=0.3):
+    """A car's own values without gravity, late, and those of a phone that lies turned; what a
+    sample truly is in the car's axes; and the rotation from the car's axes to the phone's."""
+    rng = np.random.default_rng(seed)
+    turn = Rotation.from_rotvec(np.radians(rng.uniform(-2, 2, 3))).as_matrix() @ QUARTER
+    fine = 100.0
+    t = np.arange(0, SECONDS, 1 / fine)
+    slow = butter(4, 1.0, fs=fine, output="sos")
+    motion = sosfiltfilt(slow, rng.normal(size=(len(t), 3)), axis=0) * [1, 0.8, 0.02]
+    motion /= motion[:, 0].std()
+    shakes = sosfiltfilt(slow, rng.normal(size=(len(t), 3)), axis=0)
+    shakes *= left / shakes[:, 0].std()
+    at = np.arange(1.0, SECONDS - 2, 1 / RATE)
+
+    def read(values, when):
+        return np.stack([np.interp(when, t, axis) for axis in values.T], axis=1)
+    car = read(motion, at - late_s) * [1, 1, 0]
+    phone = (read(motion + shakes, at) + [0, 0, GRAVITY]) @ turn.T
+    stamps = np.round(1e9 * (1000 + at))
+    return Samples.of(stamps, car), Samples.of(stamps, phone), read(motion, at), turn
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_written_model_leaves_what_is_claimed(seed, tmp_path):
+    *pair, true, turn = drive(seed, 0.2)
+    found = diagnose(tuple(pair))
+    assert [f.cause for f in found.findings] == ["misalignment"]
+    finding, = found.findings
+    # exactly the rotation that the signal was turned by, wherever its angles lie
+    assert np.degrees(np.abs(finding.effect.rotation.T - turn)).max() < 3
+    assert finding.std["roll_deg"] > 10 * finding.std["pitch_deg"]
+    assert "only together are they known" in finding.effect.explanation
+    found.model.save(tmp_path / "turned.yaml")
+    model = SensorModel.load(tmp_path / "turned.yaml")
+    judged = validate(tuple(pair), model)
+    assert judged.turned
+    assert judged.whole_nrmse == pytest.approx(found.extended["nrmse"], rel=0.1)
+    assert 0.2 < judged.whole_nrmse < 0.4
+
+    late, = model.reference_faults
+    assert late.cause == "reference_delay"
+    assert late.delay_s == pytest.approx(0.2, abs=0.02)
+    # the corrected samples are the car's motion at their own instants
+    corrected = correct(pair[1], model)
+    at = np.searchsorted(pair[1].stamps_ns, corrected.stamps_ns)
+    assert np.array_equal(pair[1].stamps_ns[at], corrected.stamps_ns)
+    error = corrected.values[:, 0] - true[at, 0]
+    assert np.std(error - error.mean()) < 0.4
