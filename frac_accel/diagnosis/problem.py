@@ -265,7 +265,10 @@ class Problem:
             return added
         before = {**linear, cause: effects[cause]} if cause in effects else linear
         across = effect.stage == CROSS_AXIS
-        return self.simulate({**linear, cause: effect}, across) - self._remembered(before, across)
+        # where all of a path is new, few steps show as much as a first order is worth
+        few = cause not in effects and follows_path(effect)
+        return self.simulate({**linear, cause: effect}, across,
+                             _STEPS_OF_SLOPES if few else _STEPS) - self._remembered(before, across)
 
     def force(self, model, effect, motion):
         """First-order response to a force along a motion."""
@@ -521,7 +524,8 @@ class Problem:
         point, theta = fit.whole, fit.theta
         columns = np.zeros((len(self.record), len(theta)))
         forced = any(map(acts_on_spring, point.effects.values()))
-        steps = _STEPS_OF_SLOPES if forced else _STEPS
+        pathed = any(map(follows_path, point.effects.values()))
+        steps = _STEPS_OF_SLOPES if forced or pathed else _STEPS
         before = point.simulated
         model = self.axis_model(point.effects)
         crossed = any(effect.stage == CROSS_AXIS for effect in model.effects)
@@ -532,6 +536,8 @@ class Problem:
                 # with fewer steps a motion at its limit has no bound
                 steps = _STEPS
                 before = self.simulate(point.effects, False, steps)
+        elif pathed:
+            before = self.simulate(point.effects, not forced, steps)
         for i, unknown in enumerate(fit.unknowns):
             sides = []
             for step in (unknown.step, -unknown.step):
@@ -663,6 +669,11 @@ def _span(columns):
 def acts_on_spring(effect):
     """Whether an effect changes the force of the core's spring."""
     return type(effect).add_force is not Effect.add_force
+
+
+def follows_path(effect):
+    """Whether what an effect does depends on the path that the motion has taken."""
+    return type(effect).change_motion is not Effect.change_motion
 
 
 def _to_theta(value, unknown):

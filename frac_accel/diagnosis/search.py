@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 
 from ..errors import FracAccelError
-from ..model.effects import IDENTIFIED, Effect, known_effects
+from ..model.effects import IDENTIFIED, known_effects
 from ..model.parameters import fixed_values
-from .problem import acts_on_spring
+from .problem import acts_on_spring, follows_path
 from .stages import SEARCHED, Stages
 
 _BEAM = 3
@@ -427,7 +427,7 @@ class Search:
 
 def _is_nonlinear(fitted):
     """Whether the motion of a fit is simulated step by step."""
-    return any(acts_on_spring(effect) or type(effect).change_motion is not Effect.change_motion
+    return any(acts_on_spring(effect) or follows_path(effect)
                for effect in fitted.effects.values())
 
 

@@ -36,6 +36,8 @@ class Convolution:
     memory_s : float
         Time [s] by which a response may come before its cause (a negative delay), which needs
         room.
+    oversampled : bool
+        Whether the input has nothing near its Nyquist frequency.
 
     Notes
     -----
@@ -46,7 +48,7 @@ class Convolution:
     (D. J. Wilcox, *Int. J. Elect. Eng. Educ.* 15 (1978) 247-265). O(n log n).
     """
 
-    def __init__(self, values, rate, memory_s=0.0):
+    def __init__(self, values, rate, memory_s=0.0, oversampled=False):
         self._n = len(values)
         self._length = _fast_length(_PERIOD * self._n + int(np.ceil(memory_s * rate)))
         self._sigma = _DAMPING / self._length
@@ -58,7 +60,8 @@ class Convolution:
         self._s /= self._length
         self._s += self._sigma
         self._s *= rate
-        ramp = np.linspace(0, 1, len(self._s) - int((1 - _turned(values)) * len(self._s)))
+        turned = _TURNED[0] if oversampled else _turned(values)
+        ramp = np.linspace(0, 1, len(self._s) - int((1 - turned) * len(self._s)))
         self._ramp = ramp * ramp * (3 - 2 * ramp)
 
     @property

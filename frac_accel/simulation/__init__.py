@@ -25,8 +25,9 @@ _REFINED = 4
 _STEPS_PER_SAMPLE = 8
 _MOST_STEPS_PER_SAMPLE = 64
 # Points in each sampling interval at which a path is followed: a turn of the largest motion must be
-# known far better than the smallest play.
+# known far better than the smallest play. A coarse simulator follows it at fewer.
 _PATH_STEPS = 16
+_FEW_PATH_STEPS = 4
 # With fewer steps the modes of a fractional memory need not be finer.
 _FEW_STEPS = 4
 # Frequencies at which links are evaluated at a time.
@@ -268,7 +269,8 @@ class AxisSimulator:
         highest = natural / (2 * np.pi) * np.sqrt(1 + force.slope)
         wanted = self._least_steps * max(1.0, 3 * highest / self._rate)
         if model.path_dependent:
-            wanted = max(wanted, _PATH_STEPS)
+            wanted = max(wanted, _PATH_STEPS if self._least_steps >= _FEW_STEPS
+                         else _FEW_PATH_STEPS)
         steps = int(np.ceil(min(wanted, _MOST_STEPS_PER_SAMPLE)))
         position = ratio * np.arange(self._n) - delay_s * self._rate
         count = int(max(position[-1], self._n)) + _BEYOND
@@ -296,7 +298,7 @@ class AxisSimulator:
         moving = deviation - start
         filtering = [effect for effect in behind if effect.stage < GAIN]
         if filtering:
-            conditioner = Convolution(moving, self._rate * steps)
+            conditioner = Convolution(moving, self._rate * steps, oversampled=steps > 1)
             moving = conditioner.response(_product(filtering, conditioner.s))
         gain = _product([effect for effect in behind if effect.stage >= GAIN], np.array([1j]))
         start *= _static_gain(lambda s: _product(filtering, s)) if start else 0.0
