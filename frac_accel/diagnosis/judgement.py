@@ -10,6 +10,7 @@ from ..errors import FracAccelError
 from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.effects import effect_of, known_effects
+from ..model.effects.base import OFFSET
 from .doubts import by_what_is_left, doubts_about, left_open, resembles, within_own_delay
 from .empirical import fit_empirical_link
 from .empirical_map import fit_empirical_map
@@ -348,7 +349,7 @@ def _sure(engine, best, findings, tied, left, fraction):
                     and (fraction > _LEFT or engine.unsteadiness(best, f.cause) > _STEADY)}
     fitted, stds, dropped = _refitted(engine, best, {f.cause for f in findings} - doubtful, tied)
     findings = [f for f in findings if f.cause not in doubtful and f.cause not in dropped]
-    fitted, stds = _with_identified(engine, fitted, stds)
+    fitted, stds = _with_identified(engine, best, fitted, stds)
     if fitted.causes != best.causes:
         findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
                     if f.cause in fitted.effects else f for f in findings]
@@ -407,15 +408,22 @@ def _account(engine, fitted, findings, noise):
                    accounted and not is_covered(everywhere, over))
 
 
-def _with_identified(engine, fitted, stds):
-    """A fit with what was identified beside the core, where that predicts held-out data better,
-    named or not; and its uncertainties. What is named is not bent by it: then only beside what is
-    as common."""
-    p, more = engine.problem, {cause: effect for cause, effect in engine.identified.items()
-                               if cause not in fitted.effects}
+def _with_identified(engine, best, fitted, stds):
+    """A fit with what was identified beside the core, or is common in the best set, where that
+    predicts held-out data better, named or not; and its uncertainties.
+
+    What is named is not bent by it: beside an odd cause only a constant, whose absence bends the
+    gain where there is gravity, and all else with it.
+    """
+    p = engine.problem
+    common = {**engine.identified,
+              **{cause: effect for cause, effect in best.effects.items() if effect.stage == OFFSET
+                 and effect.everyday}}
     odd = [cause for cause in fitted.causes - engine.search.base.keys()
            if not fitted.effects[cause].everyday]
-    if odd or not more:
+    more = {cause: effect for cause, effect in common.items() if cause not in fitted.effects
+            and (not odd or effect.stage == OFFSET)}
+    if not more:
         return fitted, stds
     wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
     better = gain(*((p.measured - engine.learnt(fit).output)[engine.held_out_rows]
