@@ -116,6 +116,15 @@ def judge(engine, best, found, shown, noise_std=None):
                     lambda fitted: read_off(engine, fitted, found, shown))
 
 
+def _constants(effects):
+    """Causes of some effects that are a common constant: in doubt, it has no name, but it stays.
+
+    Without it gravity bends the gain, and that the rest.
+    """
+    return {cause for cause, effect in effects.items()
+            if effect.everyday and effect.stage == OFFSET}
+
+
 class Examined(NamedTuple):
     """A set of causes with all that its judgement rests on."""
 
@@ -141,7 +150,8 @@ def _settled(engine, best, noise_std, known=None):
     there, gone = here, {}
     for _ in range(_AGAIN):
         # what cannot be named must not stand in the way of what can
-        unwanted = {cause for cause in there.doubts if cause not in engine.uncontested}
+        unwanted = {cause for cause in there.doubts.keys() - _constants(there.best.effects)
+                    if cause not in engine.uncontested}
         # what is common may be in doubt only for its odd company
         unwanted = {cause for cause in unwanted
                     if not there.best.effects[cause].everyday} or unwanted
@@ -150,7 +160,7 @@ def _settled(engine, best, noise_std, known=None):
         gone |= {cause: there.doubts[cause] for cause in unwanted}
         there = _examined(engine, engine.instead(there.best, unwanted), noise_std, known)
         # one that is doubtful, too, may lead to another that is not
-        if not there.doubts:
+        if not there.doubts.keys() - _constants(there.best.effects):
             if there.gains.keys() - here.gains.keys():
                 here, dropped = there, {**dropped, **gone}
             break
@@ -183,7 +193,8 @@ def _without_the_weakest(engine, here, noise_std, known):
     # more do not become clear by leaving out two
     for _ in range(_WEAKEST if len(here.doubts) <= _WEAKEST + 1 else 0):
         # what comes into doubt only without another one stays
-        doubtful = (there.doubts.keys() & here.doubts.keys()) - engine.uncontested
+        doubtful = (there.doubts.keys() & here.doubts.keys()) - engine.uncontested \
+            - _constants(there.best.effects)
         if not doubtful or len(there.gains) < 2 or engine.problem.limit.ends_search(
                 "the weakest doubtful causes were not left out first"):
             break
@@ -191,7 +202,9 @@ def _without_the_weakest(engine, here, noise_std, known):
         dropped[weakest] = there.doubts[weakest]
         there = _examined(engine, engine.search.without(there.best, weakest), noise_std, known)
         # a smaller set does not understand more
-        if there.gains and not there.doubts and min(g.taken for g in there.gains.values()) \
+        named = there.gains.keys() - there.doubts.keys()
+        if named and not there.doubts.keys() - _constants(there.best.effects) \
+                and min(there.gains[cause].taken for cause in named) \
                 > WEIGHS * engine.unexplained(here.best):
             return there, dropped
     return here, {}
@@ -417,12 +430,11 @@ def _with_identified(engine, best, fitted, stds):
     """
     p = engine.problem
     common = {**engine.identified,
-              **{cause: effect for cause, effect in best.effects.items() if effect.stage == OFFSET
-                 and effect.everyday}}
+              **{cause: best.effects[cause] for cause in _constants(best.effects)}}
     odd = [cause for cause in fitted.causes - engine.search.base.keys()
            if not fitted.effects[cause].everyday]
     more = {cause: effect for cause, effect in common.items() if cause not in fitted.effects
-            and (not odd or effect.stage == OFFSET)}
+            and (not odd or cause in _constants(common))}
     if not more:
         return fitted, stds
     wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
@@ -442,18 +454,19 @@ def _refitted(engine, best, named, tied):
     base, named, dropped = engine.search.base.keys(), named & best.effects.keys(), {}
     fitted = best
     stds = known = engine.uncertainties(best)
-    missing = best.causes - base - named
+    constant = _constants(best.effects) - base
+    missing = best.causes - base - named - constant
     if named and missing and missing <= tied.keys() and all(
             engine.agrees(best, stds, named, engine.search.fits.get(tied[cause]))
             for cause in missing):
         kept = {c: e for c, e in best.effects.items() if c not in missing}
         return engine.problem.fit(kept, held=kept), stds, {}
     while True:
-        if named != fitted.causes - base:
+        if named | constant != fitted.causes - base:
             fitted = engine.search.to_its_best(engine.search.fit(
-                {c: e for c, e in best.effects.items() if c in named or c in base}))
+                {c: e for c, e in best.effects.items() if c in named | constant or c in base}))
             stds = engine.uncertainties(fitted)
-            takes = {c: engine.rms(engine.added(fitted, c)) for c in fitted.causes - base}
+            takes = {c: engine.rms(engine.added(fitted, c)) for c in named & fitted.causes}
             found = {**by_what_is_left(engine, fitted, takes, engine.left(fitted)),
                      **left_open(engine, fitted, stds, takes),
                      **{c: "without what is only suspected its parameters are others"
