@@ -1,12 +1,13 @@
 """A record beside the best simulation of it, and what it shows by itself."""
 
 import dataclasses
+import functools
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import resample_poly
 
 from ..model.effects import known_effects
+from ..signals.convolution import Convolution
 from .gain import gain
 from .leftover import rounding_errors
 
@@ -14,6 +15,8 @@ from .leftover import rounding_errors
 # left can be compared with the motion's: not in a shock.
 _STRETCH = 64
 _LASTS = 0.1
+# Times the rate at which the output is known before it is read between instants by a cubic spline.
+_FINE = 4
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,9 +112,15 @@ class Seen:
 
     def _output_at(self, place):
         """Simulated output between the record's instants."""
-        fine = resample_poly(self.output, 4, 1)
-        spline = CubicSpline(np.arange(len(fine)) / 4, fine)
+        spline = CubicSpline(np.arange(len(self._fine_output)) / _FINE, self._fine_output)
         return spline(np.clip(place, 0, len(self.output) - 1))
+
+    @functools.cached_property
+    def _fine_output(self):
+        # a filter by windows would ripple: under gravity, by more than stamps that scatter do
+        convolution = Convolution(self.output - self.output[0], 1.0)
+        return self.output[0] + convolution.response_between(
+            np.ones(len(convolution.s)), _FINE, _FINE * len(self.output))
 
 
 def added(engine, fitted):

@@ -9,6 +9,7 @@ from ..errors import FracAccelError
 from ..model import AXES
 from .clock import usable
 from .held import first_of_held
+from .instants import put_on_instants
 from .pairing import FEWEST, by_slots, by_stamps, same_clock
 from .relation import clock_offset, refined
 from .resampling import within
@@ -255,6 +256,7 @@ class Record:
         words = [f"the {topic.name} holds each value for {length:.3g} samples: the first of them "
                  f"counts, at {topic.clock.rate_hz:.4g} Hz"
                  for topic, length in ((one, held), (two, held_too)) if length > 1]
+        words += [said for topic in (one, two) for said in put_on_instants(topic)]
         if offset is not None and _far(offset, one, two):
             taken_out = offset.seconds
             two.shift(-taken_out)

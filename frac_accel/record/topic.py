@@ -114,6 +114,11 @@ class Topic:
         """The `Clock` behind its stamps."""
         return Clock.of(self.stamps_ns)
 
+    @property
+    def scatters(self):
+        """Whether its stamps scatter about uniform instants by more than clocks do."""
+        return self.clock.scatter_s * self.clock.rate_hz > _JITTER
+
     def shift(self, seconds):
         """Move all stamps; what has been found of them holds as it is."""
         self.stamps_ns = self.stamps_ns + round(seconds * 1e9)
@@ -147,7 +152,7 @@ class Topic:
     def integrity(self, column, own_instants=True):
         """`Integrity` of one axis; of values on other instants, what still holds of them."""
         clock = self.clock
-        jitter = clock.scatter_s if clock.scatter_s * clock.rate_hz > _JITTER else 0.0
+        jitter = clock.scatter_s if self.scatters else 0.0
         step, (lower, upper) = self.step(column), self.limits(column)
         words = self._stamp_words(jitter)
         if step:
