@@ -26,6 +26,7 @@ from .words import (
     description_words,
     gain_words,
     hidden_words,
+    hint_words,
     is_accounted,
     reason_of,
     set_aside,
@@ -50,6 +51,9 @@ _NEARLY = 0.05
 _COMMON = 0.1
 # Share of the error that all else leaves up to which what is only suspected describes a record.
 _CLEARLY = 0.9
+# Share of what is left (power) that may follow the motion in a record that counts as consistent,
+# where so little is left that it need not be noise.
+_HINT = 0.1
 # Share by which a parameter may move when what is only suspected is left out.
 _OTHERS = 0.25
 # Standard uncertainties from the model's own value by which a parameter has moved.
@@ -279,8 +283,11 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         fraction = fraction if left.share > 0 else 0.0
     account = _account(engine, fitted, findings, noise)
     strange = engine.structure(fitted)
-    # beside a model that leaves nothing that stands out, what is only suspected is chance
-    plain = not findings and not strange and engine.left(fitted).share == 0
+    # beside a model that leaves nothing that stands out, what is only suspected is chance, and a
+    # hint of the motion in what is left is no reason to call the record unexplained
+    follows = engine.left(fitted).share
+    plain = not findings and not strange and (
+        follows == 0 or account.accounted and follows < _HINT)
     verdict = verdict_of(
         findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
         fraction, account.accounted, strange or account.faulty)
@@ -305,6 +312,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         + set_aside(engine.aside, engine.drowned, engine.record.valid)
         + description_words([] if kept else [*described.values()], unnamed,
                             sorted(kept.keys() - fitted.causes), after / spread)
+        + hint_words(follows if plain else 0.0)
         + hidden_words(account.own, account.error) + late,
         {"rmse": account.before, "nrmse": account.before / spread,
          "noise_rms": floor or left.noise_rms},

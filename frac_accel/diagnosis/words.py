@@ -85,6 +85,11 @@ def description_words(described, unnamed, kept, left):
     return words
 
 
+def hint_words(share):
+    """Words for the share of what is left that follows the motion, in a consistent record."""
+    return f"; {share:.0%} of the power of what is left follows the motion" if share else ""
+
+
 def hidden_words(own, error):
     """Words for what the reference's own noise (RMS) makes of an error (RMS)."""
     return (f"; {min(own / error, 1.0)**2:.0%} of that power is what the reference's own noise "
