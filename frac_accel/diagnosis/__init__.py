@@ -128,7 +128,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     poor = _too_poor(record, column, used, model)
     if poor:
         return insufficient(poor, model, found)
-    stds, seed, rival = _stated(model, axis) if model else {}, None, {}
+    stds, seed, rival = _stated(model, axis) if model else {}, None, None
     if model is None:
         stages.enter("identifying a classical model", IDENTIFIED)
         model, stds, seed, rival = _classical(record, axis, used, limit)
@@ -302,7 +302,7 @@ def _classical(record, axis, used, limit):
     def opened(model):
         return {cause: entry.effect
                 for cause, entry in _left_open(model.axis(axis), stds, 0.0).items()}
-    rival = {}
+    rival = None
     if isinstance(core.core, Oscillator):
         core, seed, rival = flat_instead(record, AXES.index(axis), used, core, opened, seed, limit)
     return core, stds, seed, rival

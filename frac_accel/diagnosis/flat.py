@@ -1,6 +1,7 @@
 """Whether a record without a model is better begun with a gain than with an oscillator."""
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +25,18 @@ _OVERDAMPED = 1.0
 _SURELY_LESS, _NEARLY_AS_GOOD = 0.005, 1.02
 # Standard uncertainties by which both must differ for a parameter to be as open as that.
 _OPEN_FROM = 2.0
+# Times what the diagnosis leaves in the end (RMS) up to which a rival describes as much.
+_AS_MUCH = 1.2
 # Variances of the noise within which a gain with one link describes a record as well.
 _AS_WELL = 10.0
+
+
+class Rival(NamedTuple):
+    """What describes a record as well as an oscillator: effects by cause, and RMS that it leaves
+    [output units]."""
+
+    effects: dict
+    rms: float
 
 
 def flat_instead(record, column, used, model, opened, seed, limit=None):
@@ -54,9 +65,9 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
         The one given, or with the gain.
     dict of str to Effect
         What to begin with.
-    dict of str to Effect
+    Rival or None
         With the oscillator: what a gain with one link has instead that describes the record as
-        well; empty where none does.
+        well, if any does.
     """
     if len(record) > LONG:
         record, used = strongest_part(record, column, used, LONG // 2)
@@ -79,18 +90,18 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
     enough = _FAR_LESS if model.axes[column].core.damping_ratio < _OVERDAMPED else 1.0
     found = next((fit for fit in fits if fit.cost <= enough * before.cost
                   or (fit.size < before.size and fit.cost <= as_well)), None)
-    rival = {}
+    rival = None
     if found is None:
         found, rival = _or_with_a_link(own, before, fits)
     if found is None:
         return model, seed, rival
     return flat, {cause: effect for cause, effect in found.effects.items()
-                  if cause not in engine.search.base}, {}
+                  if cause not in engine.search.base}, None
 
 
 def _or_with_a_link(own, before, fits):
     """The fit that is better than an oscillator and as good as one with another link, if any; and
-    the effects of the one that describes the record as well, if any."""
+    the `Rival` that describes the record as well, if any."""
     change = _change(own, before, fits)
     as_good = 0.0
     if fits and fits[0].cost < _LESS * before.cost:
@@ -100,7 +111,9 @@ def _or_with_a_link(own, before, fits):
     found = next((fit for other in (_with_a_link(own, before)[:1] if as_good else ())
                   for fit in fits
                   if fit.size < other.size and fit.cost <= as_good * other.cost), None)
-    return found, fits[0].effects if change and change.ci95[1] >= 0 else {}
+    if not change or change.ci95[1] < 0:
+        return found, None
+    return found, Rival(fits[0].effects, float(np.sqrt(fits[0].cost / own.problem.count)))
 
 
 def _change(engine, before, fits):
@@ -120,12 +133,15 @@ def with_rival(judged, rival):
     Parameters
     ----------
     judged : Diagnosis
-    rival : dict of str to Effect
-        As from `flat_instead`.
+    rival : Rival or None
+        As from `flat_instead`; what leaves clearly more than the diagnosis in the end is none.
     """
+    if rival is None or rival.rms > _AS_MUCH * judged.extended["rmse"]:
+        return judged
+    other = rival.effects
     return dataclasses.replace(judged, findings=[
-        _as_open(finding, rival[finding.cause], sorted(rival.keys() - {finding.cause}))
-        if finding.cause in rival else finding for finding in judged.findings])
+        _as_open(finding, other[finding.cause], sorted(other.keys() - {finding.cause}))
+        if finding.cause in other else finding for finding in judged.findings])
 
 
 def _as_open(finding, other, beside):

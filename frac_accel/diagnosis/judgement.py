@@ -9,7 +9,7 @@ from scipy.special import expit
 from ..errors import FracAccelError
 from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel, is_link
-from ..model.effects import effect_of, known_effects
+from ..model.effects import IDENTIFIED, effect_of, known_effects
 from ..model.effects.base import OFFSET
 from .doubts import by_what_is_left, doubts_about, left_open, resembles, within_own_delay
 from .empirical import fit_empirical_link
@@ -271,7 +271,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     findings, fitted, stds, more = _sure(engine, best, findings, tied, left, fraction)
     suspects += more
     unnamed = sorted(fitted.causes - {f.cause for f in findings} - engine.search.base.keys())
-    complete = fitted.causes == best.causes
+    complete = fitted.causes >= best.causes
     if not complete:
         fraction = _remaining(engine, fitted, left.noise_rms)
     # beside the model as it is in the end, not beside one with what is only suspected
@@ -433,16 +433,24 @@ def _with_identified(engine, best, fitted, stds):
     """A fit with what was identified beside the core, or is common in the best set, where that
     predicts held-out data better, named or not; and its uncertainties.
 
-    What is named is not bent by it: beside an odd cause only a constant, whose absence bends the
-    gain where there is gravity, and all else with it.
+    What is named is not bent by it: beside an odd cause only what that would be bent by without
+    it, a constant where there is gravity, and, whatever it gains, a delay where a clock is off: two
+    clocks never start together.
     """
-    p = engine.problem
+    p, delay = engine.problem, IDENTIFIED["delay_s"](0.0)
     common = {**engine.identified,
               **{cause: best.effects[cause] for cause in _constants(best.effects)}}
+    needed = _constants(common)
     odd = [cause for cause in fitted.causes - engine.search.base.keys()
            if not fitted.effects[cause].everyday]
+    effects = fitted.effects.values()
+    if any(effect.clock_ratio() != 1 or effect.time_steps() for effect in effects) \
+            and not any(delay.cause in (effect.cause, effect.mirrors) for effect in effects):
+        fitted = engine.search.to_its_best(
+            engine.search.fit({delay.cause: delay, **fitted.effects}))
+        stds = engine.uncertainties(fitted)
     more = {cause: effect for cause, effect in common.items() if cause not in fitted.effects
-            and (not odd or cause in _constants(common))}
+            and (not odd or cause in needed)}
     if not more:
         return fitted, stds
     wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))

@@ -179,8 +179,9 @@ class Search:
         return better
 
     def _varied(self, fit):
-        """The best of a fit and its like with another of what no fit varies, such as an order."""
-        tried = set()
+        """The best of a fit and its like with another of what no fit varies, such as an order or
+        which of two peaks is whose."""
+        fit, tried = self._exchanged(fit), set()
         # in a smaller set its like has been compared already
         known = {cause for smaller in self.fits.values() if smaller.causes < fit.causes
                  for cause, effect in smaller.effects.items()
@@ -206,6 +207,23 @@ class Search:
             if better is fit:
                 return fit
             fit = better
+
+    def _exchanged(self, fit):
+        """The better of a fit and the same with two resonances exchanged."""
+        free = [effect for cause, effect in fit.effects.items()
+                if cause in self.base and effect.restates_core]
+        for effect in [e for cause, e in fit.effects.items() if cause not in self.base]:
+            for core in free:
+                pair = effect.exchanged(core)
+                if pair is None or self.problem.limit.ends_search(
+                        "which of two resonances is the sensor's was not tried"):
+                    continue
+                try:
+                    other = self.problem.fit({**fit.effects, **{e.cause: e for e in pair}})
+                except FracAccelError:
+                    continue
+                fit = other if other.cost < fit.cost else fit
+        return fit
 
     def _strayed(self, fit):
         """How far what the model in use leaves open has moved from what it says."""

@@ -204,6 +204,13 @@ class Effect:
         """
         return []
 
+    def exchanged(self, other):
+        """This effect and another one that restates the core, with each other's resonance; or None.
+
+        Which of two peaks is whose, a fit does not find out by small steps.
+        """
+        return None
+
     @classmethod
     def left_open(cls, axis_model, stds, stamps_std_s):
         """`Open` where the model in use knows this cause only so well, otherwise None.

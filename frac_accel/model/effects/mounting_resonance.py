@@ -8,6 +8,9 @@ from ..parameters import parameter
 from .base import MOUNTING, Effect
 from .fit_starts import finite, grid, spectral_peaks
 
+# Damping ratio up to which a peak shows.
+_RESONANT = 0.7
+
 
 @dataclasses.dataclass(frozen=True)
 class MountingResonance(Effect):
@@ -38,6 +41,13 @@ class MountingResonance(Effect):
 
     def zeros(self):
         return np.array([-np.pi * self.frequency_hz / self.damping_ratio])
+
+    def exchanged(self, other):
+        core = getattr(other, "natural_frequency_hz", None), getattr(other, "damping_ratio", None)
+        if None in core or max(core[1], self.damping_ratio) > _RESONANT:
+            return None
+        return MountingResonance(*core), dataclasses.replace(
+            other, natural_frequency_hz=self.frequency_hz, damping_ratio=self.damping_ratio)
 
     @classmethod
     def starts(cls, view):
