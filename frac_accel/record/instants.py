@@ -46,7 +46,7 @@ def put_on_instants(topic):
         values[slot] += measured - spline(place)
     scatter, topic.values = clock.scatter_s, values[slot]
     topic.stamps_ns = topic.stamps_ns - np.round(1e9 * late / clock.rate_hz).astype(np.int64)
-    topic.clock = dataclasses.replace(clock, scatter_s=0.0)
+    topic.clock = dataclasses.replace(clock, scatter_s=0.0, start_s=-clock.slot[0] / clock.rate_hz)
     return [f"the {topic.name}'s samples were taken where their stamps say, which scatter by "
             f"{scatter:.3g} s (RMS): they are put on uniform instants"]
 

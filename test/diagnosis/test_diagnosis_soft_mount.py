@@ -6,7 +6,7 @@ from sampled_pair import sampled_pair
 from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 
 from frac_accel import Samples, diagnose
-from frac_accel.diagnosis.flat import with_rival
+from frac_accel.diagnosis.flat import Rival, with_rival
 from frac_accel.model.effects import known_effects
 
 RATE, COUNT, FINER = 400.0, 12_000, 32
@@ -57,13 +57,17 @@ def test_a_delay_is_as_uncertain_as_what_describes_the_record_as_well_makes_it()
     assert named.cause == "time_delay"
     causes = known_effects()
     mount = causes["mounting_resonance"](197.0, 0.2)
-    open_one, = with_rival(found, {"time_delay": causes["time_delay"](2.3e-3),
-                                   "mounting_resonance": mount}).findings
+    left = found.extended["rmse"]
+    rival = Rival({"time_delay": causes["time_delay"](2.3e-3), "mounting_resonance": mount}, left)
+    open_one, = with_rival(found, rival).findings
     away = 2.3e-3 - named.effect.delay_s
     assert open_one.std["delay_s"] == pytest.approx(away / np.sqrt(3), rel=1e-3)
     assert "mounting_resonance" in open_one.evidence[-1]
-    same, = with_rival(found, {"time_delay": named.effect, "mounting_resonance": mount}).findings
+    same, = with_rival(found, Rival({"time_delay": named.effect, "mounting_resonance": mount},
+                                    left)).findings
     assert same.std == named.std and same.evidence == named.evidence
+    # what leaves more than the diagnosis in the end does not describe the record as well
+    assert with_rival(found, rival._replace(rms=1.5 * left)) is found
 
 
 def delayed_pair(rng, delay_s):
