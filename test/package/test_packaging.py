@@ -186,6 +186,19 @@ def test_every_library_has_its_key_or_is_asked_for_in_one_line(capsys, monkeypat
         assert f"pip install {library}" in line
 
 
+@pytest.mark.parametrize("library, name",
+                         [("mcap", "mcap"), ("scipy", "scipy"), ("yaml", "PyYAML")])
+def test_a_library_that_is_missing_is_one_line_and_status_2(library, name, tmp_path):
+    bag = ROOT / "bags" / "fractional_bench.mcap"
+    code = (f"import sys; sys.modules[{library!r}] = None; from frac_accel.cli import main; "
+            f"sys.exit(main(['correct', {str(bag)!r}, '--model', "
+            f"{str(bag.with_suffix('.yaml'))!r}, '-o', {str(tmp_path / 'out.mcap')!r}]))")
+    result = run([sys.executable, "-c", code])
+    assert result.returncode == 2, result.stderr
+    line, = result.stderr.splitlines()
+    assert f"the Python library {library} is missing; install it with pip install {name}" in line
+
+
 def declared_arguments(tree, function):
     """First arguments of the calls to `function` in a syntax tree."""
     return {node.args[0].value for node in ast.walk(tree)
