@@ -21,7 +21,7 @@ def run(arguments):
         import shtab
     except ModuleNotFoundError:
         raise FracAccelError("the script is made by the Python library shtab, which is missing; "
-                             "install it with pip install 'frac_accel[completion]'") from None
+                             "install it with pip install shtab") from None
     if arguments.shell not in shtab.SUPPORTED_SHELLS:
         raise FracAccelError(f"the installed shtab does not know {arguments.shell}; install a "
                              "newer one with pip install -U shtab")

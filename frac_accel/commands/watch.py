@@ -41,7 +41,7 @@ def add_arguments(parser):
 def run(arguments):
     """Do it."""
     for name, way in (("rclpy", "pip install 'frac_accel[ros]', or source a ROS 2"),
-                      ("rich", "pip install 'frac_accel[watch]'")):
+                      ("rich", "pip install rich")):
         if importlib.util.find_spec(name) is None:
             raise FracAccelError(f"watch needs the Python library {name}: {way}")
     if not sys.stdout.isatty():
