@@ -181,6 +181,22 @@ def test_progress_is_for_terminals_with_the_share_done_and_the_time_left():
     assert (piped.stdout, piped.stderr, piped.returncode) == ("", "", 0)
 
 
+@pytest.mark.parametrize("steps, words", [
+    # without a step for long
+    ("show('fitting', 0); time.sleep(3.2)", r"fitting: 0 % done.*00:03"),
+    # small ones after a large one
+    ("show('fitting', 0); time.sleep(2.2); show('fitting', 0.5); time.sleep(0.3)\n"
+     "    for i in range(5): show('judging', 0.5 + 0.01 * i); time.sleep(0.3)",
+     r"judging: 53 % done"),
+])
+def test_progress_does_not_stand_still(steps, words):
+    code = f"{PROGRESS.splitlines()[0]}\nwith share_done() as show:\n    {steps}\n"
+    shown = in_terminal(code + "print('the end')")
+    assert re.search(words, shown), shown
+    # nothing of it is left
+    assert re.search(r"\r +\rthe end", shown), repr(shown)
+
+
 @pytest.mark.parametrize("run", [
     lambda show: identify(BAGS / "fractional_bench.mcap", progress=show),
     lambda show: identify([BAGS / "classical_bench.mcap", BAGS / "fractional_bench.mcap"],
