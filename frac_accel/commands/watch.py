@@ -47,6 +47,10 @@ def run(arguments):
     if not sys.stdout.isatty():
         raise FracAccelError("watch draws in a terminal, and the output is none; "
                              "ros2 topic echo /diagnostics gives the same as text")
+    if os.environ.get("TERM") in ("dumb", "unknown"):
+        # rich would show nothing at all
+        raise FracAccelError(f"watch draws in a terminal, and TERM={os.environ['TERM']} says that "
+                             "this one cannot; ros2 topic echo /diagnostics gives the same as text")
     from ..nodes._watcher import Watcher
     with contextlib.suppress(KeyboardInterrupt), Watcher() as watcher, _keys() as pressed:
         _show(watcher, arguments.sensors, pressed)

@@ -136,6 +136,13 @@ def test_without_a_terminal_it_says_what_to_do():
     assert result.returncode == 2 and "draws in a terminal" in line
 
 
+def test_where_nothing_can_be_drawn_it_says_what_to_do():
+    with Terminal({"TERM": "dumb"}) as shown:
+        assert shown.process.wait(30) == 2
+        shown.read(0.5)
+    assert "TERM=dumb" in shown.text and "ros2 topic echo" in shown.text
+
+
 def test_a_silent_corrector_and_missing_figures_are_said():
     from rich.console import Console
     sensor = Seen("/front/imu/data_raw", 60)
