@@ -98,6 +98,18 @@ def test_each_help_has_examples_that_can_be_given(verb, capsys):
         assert parser.parse_args(arguments).verb == verb
 
 
+@pytest.mark.parametrize("verb", ["diagnose", "correct", "identify", "validate"])
+def test_each_help_within_fleet_has_its_own_example(verb, capsys):
+    status, out, _ = said(capsys, "fleet", verb, "--help")
+    examples = [line.strip() for line in out.partition("examples:\n")[2].splitlines()]
+    assert status == 0 and examples
+    for example in examples:
+        arguments = shlex.split(example)[1:]
+        assert arguments[:2] == ["fleet", verb]
+        parser, _, _ = _parser("fleet", arguments)
+        assert parser.parse_args(arguments).each == verb
+
+
 @pytest.mark.parametrize("verb", ["", *VERBS])
 def test_help_loads_no_numerical_library(verb):
     """Which would cost more than all else that it does."""
