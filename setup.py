@@ -1,5 +1,6 @@
 """Build script of the ament_python package, for colcon and for pip."""
 
+import re
 import sys
 import xml.etree.ElementTree
 from pathlib import Path
@@ -21,6 +22,21 @@ def shared(folder, pattern="*"):
     return list(by_parent.items())
 
 
+def long_description(repository):
+    """The README for an index of packages, from where links within the repository lead nowhere.
+
+    They get the repository's address, or become words where it has none.
+    """
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    if not repository:
+        text = re.sub(r"!\[([^]]*)\]\((?!http)([^)]*)\)", r"\1: `\2` in the sources.", text)
+        return re.sub(r"\[([^]]*)\]\((?!http)[^)]*\)", r"\1", text)
+    for mark, way in (("!", "raw"), ("", "blob")):
+        text = re.sub(rf"{mark}\[([^]]*)\]\((?!http)([^)]*)\)",
+                      rf"{mark}[\1]({repository.rstrip('/')}/{way}/HEAD/\2)", text)
+    return text
+
+
 # A wheel's scripts all come on PATH, under names as common as `player`; and a file of ours in bin/
 # would be the command's second one. What `ros2 run` and a workspace need is for colcon, which calls
 # `install` or `develop`.
@@ -31,17 +47,18 @@ if not {"bdist_wheel", "dist_info", "editable_wheel"} & set(sys.argv):
 
 # What a ROS machine reads of the package, and an index of Python packages too.
 about = xml.etree.ElementTree.parse(ROOT / "package.xml").getroot()
+urls = {url.get("type"): url.text for url in about.findall("url")}
 
 setup(
     name=PACKAGE,
     version=about.findtext("version"),
     description=" ".join(about.findtext("description").split()),
-    long_description=(ROOT / "README.md").read_text(encoding="utf-8"),
+    long_description=long_description(urls.get("repository")),
     long_description_content_type="text/markdown",
     license=about.findtext("license"),
     maintainer=about.findtext("maintainer"),
     maintainer_email=about.find("maintainer").get("email"),
-    project_urls={url.get("type"): url.text for url in about.findall("url")},
+    project_urls=urls,
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
     package_data={PACKAGE: ["**/*.msg", "**/*.yaml", "**/*.html", "py.typed"]},
     data_files=[

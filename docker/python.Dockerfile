@@ -7,7 +7,7 @@ FROM python:3.12-slim
 
 ENV PIP_NO_CACHE_DIR=1
 COPY . /source
-RUN pip install "/source[ros,formats]" && rm -rf /source
+RUN pip install "/source[ros,formats,watch]" && rm -rf /source
 
 WORKDIR /data
 ENTRYPOINT ["frac_accel"]

@@ -29,6 +29,7 @@ VERBS = {
     "bench": "speed, latency and memory, beside peers in the same run",
     "completion": "a script that completes all this in bash, zsh or fish",
 }
+_PIP_NAMES = {"yaml": "PyYAML"}
 _MORE = "frac_accel COMMAND --help tells more of each, with examples."
 
 
@@ -65,8 +66,7 @@ def main(arguments=None):
     try:
         parser, parsers, module = _parser(verb, arguments)
     except ModuleNotFoundError as error:
-        print(f"frac_accel: the Python library {error.name} is missing; install it with "
-              f"pip install {error.name}", file=sys.stderr)
+        print(f"frac_accel: {_missing(error)}", file=sys.stderr)
         return 2
     chosen, rest = parser.parse_known_args(arguments)
     if verb is None or rest:
@@ -91,6 +91,8 @@ def _run(chosen, module, arguments):
         status = 2
         words = ": ".join(str(part) for part in (error.filename, error.strerror or error)
                           if part is not None)
+    except ModuleNotFoundError as error:
+        words, status = _missing(error), 2
     except MemoryError:
         words, status = "there is not enough memory for this input", 2
     except KeyboardInterrupt:
@@ -103,6 +105,12 @@ def _run(chosen, module, arguments):
     with contextlib.suppress(OSError):
         print(f"frac_accel {chosen.verb}: {' '.join(words.split())}", file=sys.stderr, flush=True)
     return status
+
+
+def _missing(error):
+    library = (error.name or str(error)).partition(".")[0]
+    return (f"the Python library {library} is missing; install it with pip install "
+            f"{_PIP_NAMES.get(library, library)}")
 
 
 def _parser(verb, arguments):

@@ -11,6 +11,7 @@ import math
 import os
 import re
 import sys
+import threading
 from pathlib import Path
 
 from ..errors import BagError, FracAccelError
@@ -24,6 +25,8 @@ STRUCTURES = ("auto", "classical", "arx", "oscillator", "fractional", "gain",
               "fractional_transfer_function")
 BAG_HELP = ".mcap file or rosbag2 folder, or .db3, .csv, .parquet, .mf4, .npz (see convert)"
 _NUMBERS = re.compile(r"\[([-+.\deEnul,\s]*)\]")
+# Time [s] after which a bar is drawn anew without a step.
+_TICK_S = 0.5
 # Options that name files, of all verbs.
 INPUTS = ("bag", "bags", "inputs", "model", "result")
 OUTPUTS = ("output", "extended_model", "report", "json")
@@ -177,13 +180,35 @@ def share_done():
     """The same of work whose share that is done is known: a function of words and that share."""
     from tqdm import tqdm
     # the pace since the start tells the time left, as the last step alone would not
+    # any step is drawn: left to itself, tqdm waits for one as large as the largest so far
     with tqdm(total=100, delay=2, leave=False, file=sys.stderr, disable=None, smoothing=0,
-              bar_format="{desc}: {percentage:.0f} % done{bar:20} {elapsed}, about {remaining} left"
-              ) as bar:
+              miniters=0, bar_format="{desc}: {percentage:.0f} % done{bar:20} {elapsed}, about "
+                                     "{remaining} left") as bar, _ticking(bar):
         def show(words, share):
             bar.set_description_str(words, refresh=False)
             bar.update(max(0, round(100 * share) - bar.n))
         yield show
+
+
+@contextlib.contextmanager
+def _ticking(bar):
+    """Draw a bar anew while no step comes, so that nobody takes a long one for a standstill."""
+    over = threading.Event()
+
+    def tick():
+        while not over.wait(_TICK_S):
+            bar.update(0)
+
+    if bar.disable:
+        yield
+        return
+    thread = threading.Thread(target=tick, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def printable(name):

@@ -94,8 +94,9 @@ def run(arguments):
     if corrector.design.extrapolated_below_hz:
         print("  below {:.4g} Hz by extrapolation: the model was identified from {:.4g} to {:.4g} "
               "Hz".format(corrector.design.extrapolated_below_hz, *corrector.model.band_hz))
-    print(f"  filter delay {summary['filter_delay_s']:.4g} s; sensor's own delay "
-          f"{summary['sensor_delay_s']:.4g} s, taken out of the stamps")
+    from ..report.quantity import short
+    print(f"  filter delay {short(summary['filter_delay_s'], 's')}; sensor's own delay "
+          f"{short(summary['sensor_delay_s'], 's')}, taken out of the stamps")
     if arguments.report:
         # whoever wants no page need not wait for what draws it
         from ._correct_page import page

@@ -22,6 +22,8 @@ __all__ = ["EXAMPLES", "add_arguments", "row", "run"]
 EXAMPLES = """
 frac_accel fleet diagnose drives/ -o results --model sensor.yaml --columns vehicles.csv
 frac_accel fleet correct 'drives/*.mcap' -o results --model sensor.yaml --workers 2
+frac_accel fleet identify benches/ -o results --axis xyz
+frac_accel fleet validate drives/ -o results --model sensor.yaml
 """
 
 SOME_FAILED = 4
@@ -36,6 +38,7 @@ def add_arguments(parser):
     for verb, add in (("diagnose", _add_diagnose), ("correct", _add_correct),
                       ("identify", _add_identify), ("validate", _add_validate)):
         sub = verbs.add_parser(verb, help=f"{verb} every bag")
+        sub.exemplify("\n".join(line for line in EXAMPLES.splitlines() if f" {verb} " in line))
         _add_common(sub)
         add(sub.add_argument_group(f"as for frac_accel {verb}"))
 

@@ -18,9 +18,13 @@ class Parser(argparse.ArgumentParser):
     def describe(self, module):
         """Take description, examples and options from the module of a verb."""
         self.description = module.__doc__
-        self.epilog = "examples:\n" + textwrap.indent(module.EXAMPLES.strip(), "  ")
-        self.formatter_class = argparse.RawDescriptionHelpFormatter
+        self.exemplify(module.EXAMPLES)
         module.add_arguments(self)
+
+    def exemplify(self, examples):
+        """End the help with some lines as they can be given."""
+        self.epilog = "examples:\n" + textwrap.indent(examples.strip(), "  ")
+        self.formatter_class = argparse.RawDescriptionHelpFormatter
 
     def error(self, message):
         """Say in one line what is wrong, and end with status 2."""

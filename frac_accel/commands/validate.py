@@ -85,6 +85,7 @@ def _page(result, model, arguments):
 
 def table(result, axis):
     """Metrics as text."""
+    from ..report.quantity import fixed, short
     signals = [("simulated against measured output"
                 + (", turned into the reference's axes" if result.turned else ""),
                 result.simulation),
@@ -96,17 +97,17 @@ def table(result, axis):
         lines.append(_HEADING)
         for band in (*metrics.bands, metrics.total):
             low, high = band.band_hz
-            lines.append(f"  {low:8.4g} .. {high:<8.4g} {100 * band.nrmse:9.3f} "
-                         f"{100 * band.amplitude_error:14.3f} {band.phase_error_deg:12.3f} "
-                         f"{100 * band.peak_error:10.3f}")
+            lines.append(f"  {low:8.4g} .. {high:<8.4g} {fixed(100 * band.nrmse):>9} "
+                         f"{fixed(100 * band.amplitude_error):>14} "
+                         f"{fixed(band.phase_error_deg):>12} {fixed(100 * band.peak_error):>10}")
         lines.append(f"  median relative error {metrics.median_relative_error_percent:.3f} %")
         if metrics is result.simulation:
             lines.append(f"  at all frequencies: NRMSE {100 * result.whole_nrmse:.3f} %")
     filters, design = result.filters, result.filters["axes"][axis]
     low, high = design["band_hz"]
-    lines.append(f"filter: {low:.4g} to {high:.4g} Hz, delay {filters['filter_delay_s']:.4g} s "
-                 f"(and the sensor's own {filters['sensor_delay_s']:.4g} s, taken out of the "
-                 f"stamps), worst error {design['worst_amplitude_error']:.2%} and "
+    delay, own = (short(filters[name], "s") for name in ("filter_delay_s", "sensor_delay_s"))
+    lines.append(f"filter: {low:.4g} to {high:.4g} Hz, delay {delay} (and the sensor's own {own}, "
+                 f"taken out of the stamps), worst error {design['worst_amplitude_error']:.2%} and "
                  f"{design['worst_phase_error_deg']:.3f} deg, "
                  f"noise gain {design['noise_gain']:.3g}")
     return "\n".join(lines)

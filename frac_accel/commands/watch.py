@@ -24,10 +24,10 @@ _COLOURS = ("green", "yellow", "red")
 _PERIOD_S = 0.25
 # Time without a report after which a sensor counts as silent.
 _SILENT_S = 3.5
-# Widths of a terminal from which sparklines are long, and from which there is room for them, for
-# the latency, and for the raw RMS.
-_WIDE, _MIDDLE, _NARROW, _TINY = 140, 116, 78, 60
-_LONG, _SHORT = 20, 8
+# Widths of a terminal from which sparklines are long, from which there is room for frames, for
+# sparklines and the latency, and for the raw RMS; and lengths of the sparklines.
+_WIDE, _MIDDLE, _NARROW, _TINY = 140, 116, 80, 60
+_LENGTHS = {_WIDE: 20, _MIDDLE: 8, _NARROW: 6}
 # Lines that title, heading and frame take.
 _FRAME_LINES = 6
 
@@ -47,6 +47,10 @@ def run(arguments):
     if not sys.stdout.isatty():
         raise FracAccelError("watch draws in a terminal, and the output is none; "
                              "ros2 topic echo /diagnostics gives the same as text")
+    if os.environ.get("TERM") in ("dumb", "unknown"):
+        # rich would show nothing at all
+        raise FracAccelError(f"watch draws in a terminal, and TERM={os.environ['TERM']} says that "
+                             "this one cannot; ros2 topic echo /diagnostics gives the same as text")
     from ..nodes._watcher import Watcher
     with contextlib.suppress(KeyboardInterrupt), Watcher() as watcher, _keys() as pressed:
         _show(watcher, arguments.sensors, pressed)
@@ -59,24 +63,40 @@ def _show(watcher, wanted, pressed):
     console = Console(file=sys.__stdout__)
     with Live(console=console, screen=True, auto_refresh=False) as live:
         while pressed() not in ("q", "Q", "\x1b"):
-            sensors = [sensor for name, sensor in sorted(watcher.sensors.items())
-                       if not wanted or any(part in name for part in wanted)]
-            live.update(table(sensors, time.monotonic(), console.width, console.height),
+            live.update(picture(watcher.sensors, wanted, console.width, console.height),
                         refresh=True)
             watcher.listen(_PERIOD_S)
 
 
+def picture(known, wanted, width, height):
+    """The table of the sensors that are wanted, or why there is none."""
+    from rich.text import Text
+    sensors = [sensor for name, sensor in sorted(known.items())
+               if not wanted or any(part in name for part in wanted)]
+    if sensors:
+        return table(sensors, time.monotonic(), width, height)
+    if known:
+        return Text(f"waiting for {' or '.join(wanted)}: the raw topics of this ROS domain's "
+                    f"sensors are {', '.join(sorted(known))}; q quits")
+    return Text("waiting for a corrector: nobody publishes /diagnostics or ~/metrics of one "
+                "in this ROS domain; q quits")
+
+
 def table(sensors, now_s, width=_WIDE, height=None):
     """What is known of some sensors, as a table of rich; of more than fit, the worst."""
+    from rich.console import Console
+    drawn = _table(sensors, now_s, width, height)
+    # verdicts have further lines where there is room
+    if height and len(Console(width=width).render_lines(drawn)) > height:
+        drawn = _table(sensors, now_s, width, height, is_tight=True)
+    return drawn
+
+
+def _table(sensors, now_s, width, height, is_tight=False):
     from rich import box
     from rich.table import Table
     from rich.text import Text
-    if not sensors:
-        return Text("waiting for a corrector: nobody publishes /diagnostics or ~/metrics of one "
-                    "in this ROS domain; q quits")
     lines = max(1, (height or math.inf) - _FRAME_LINES)
-    # a long verdict has a second line where there is room
-    is_tight = 2 * len(sensors) > lines
     judged = {sensor.name: _verdict(sensor, now_s) for sensor in sensors}
     shown, of = sensors, ""
     if len(sensors) > lines:
@@ -86,11 +106,12 @@ def table(sensors, now_s, width=_WIDE, height=None):
     names = _short([sensor.name for sensor in shown])
     drawn = Table(title=f"frac_accel watch, q quits{of}", title_justify="left", expand=True,
                   box=box.HEAVY_HEAD if width >= _MIDDLE else box.SIMPLE_HEAD,
-                  padding=(0, width >= _NARROW))
-    headings = [("sensor", min(max(map(len, names)), width // (3 if width >= _NARROW else 4))),
+                  padding=(0, width >= _MIDDLE))
+    length = next((bars for least, bars in _LENGTHS.items() if width >= least), 0)
+    headings = [("sensor", min(max(map(len, names)), width // (3 if width >= _MIDDLE else 4) - 1)),
                 ("raw RMS", 7), ("", None), ("corrected RMS", 9), ("", None),
-                ("rate [Hz]", 6), ("latency 99 %", 8), ("verdict", 12)]
-    hidden = {number for number, least in ((2, _MIDDLE), (4, _MIDDLE), (6, _NARROW), (1, _TINY))
+                ("rate [Hz]", 6), ("latency 99 %", 7), ("verdict", 11)]
+    hidden = {number for number, least in ((2, _NARROW), (4, _NARROW), (6, _NARROW), (1, _TINY))
               if width < least}
     for number, (heading, least) in enumerate(headings):
         if number not in hidden:
@@ -100,7 +121,6 @@ def table(sensors, now_s, width=_WIDE, height=None):
                              no_wrap=is_text and (is_tight or not is_verdict),
                              overflow="fold" if is_verdict and not is_tight else "ellipsis",
                              ratio=1 if is_verdict else None)
-    length = _LONG if width >= _WIDE else _SHORT
     for name, sensor in zip(names, shown):
         level, verdict = judged[sensor.name]
         figures = sensor.figures

@@ -15,6 +15,7 @@ from frac_accel.streaming.live_metrics import Findings, LiveMetrics, evaluate
 _OTHER_RATE_PERIODS = 2
 # A change of health that has been told is not told again for so long.
 _TELL_AGAIN_S = 30.0
+_NOT_YET_KNOWN = "_NODE_NAME_UNKNOWN_"  # what rmw says then
 _LEVELS = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR)
 
 
@@ -179,8 +180,7 @@ class Channel:
             elif compatibility == QoSCompatibility.ERROR:
                 refusal = (f"offers another quality of service ({reason.strip().rstrip(';')}): set "
                            f"qos_overrides.{self.topic.name}.subscription")
-            name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-            result.append(health.Publisher(name, refusal))
+            result.append(health.Publisher(_node_of(info), refusal))
         return tuple(result)
 
     def _refused_subscribers(self):
@@ -194,9 +194,15 @@ class Channel:
         for info in node.get_subscriptions_info_by_topic(topic) if offered else ():
             compatibility, reason = qos_check_compatible(offered[0], info.qos_profile)
             if compatibility == QoSCompatibility.ERROR:
-                name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-                result.append(f"{name} ({reason.strip().rstrip(';')})")
+                result.append(f"{_node_of(info)} ({reason.strip().rstrip(';')})")
         return tuple(result)
+
+
+def _node_of(info):
+    """The node of an endpoint by its name, which discovery tells after the endpoint itself."""
+    if info.node_name == _NOT_YET_KNOWN:
+        return "a node whose name has not come yet"
+    return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 
 
 def _in_short(design):

@@ -1,5 +1,7 @@
 """What goes wrong where a user has named or set up something wrongly."""
 
+import difflib
+
 from rclpy.exceptions import InvalidParameterTypeException, InvalidTopicNameException
 from rclpy.qos_overriding_options import InvalidQosOverridesError
 
@@ -17,3 +19,9 @@ INVALID_ENDPOINT = (
 
 class NodeError(FracAccelError):
     """A node that cannot start or go on as asked for."""
+
+
+def did_you_mean(name, names):
+    """Hint at the one of some names that is most like another, or nothing."""
+    near = difflib.get_close_matches(name, names, 1)
+    return f": did you mean '{near[0]}'?" if near else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import re
 import signal
@@ -27,7 +26,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from frac_accel.errors import FracAccelError
-from frac_accel.nodes._errors import NodeError
+from frac_accel.nodes._errors import NodeError, did_you_mean
 from frac_accel.nodes._intake import DirectIntake, RawSubscription
 from frac_accel.nodes._service import ServiceManager
 
@@ -66,9 +65,8 @@ class FracAccelNode(Node):
         for name in getattr(self, "_parameter_overrides", ()):
             if self.has_parameter(name) or name.startswith("qos_overrides."):
                 continue
-            near = difflib.get_close_matches(name, declared, 1)
-            hint = f": did you mean '{near[0]}'?" if near else ""
-            self.get_logger().warning(f"parameter '{name}' is not known here{hint}")
+            self.get_logger().warning(
+                f"parameter '{name}' is not known here{did_you_mean(name, declared)}")
 
     def take_turn(self) -> None:
         """Do what has its turn now."""

@@ -1,7 +1,7 @@
 """The parameters that each sensor of the corrector has."""
 
 from frac_accel.io import cdr
-from frac_accel.nodes._errors import NodeError
+from frac_accel.nodes._errors import NodeError, did_you_mean
 from frac_accel.nodes._filtered_topic import ON_TWO_PUBLISHERS
 from frac_accel.streaming.stream import ON_FAULT
 
@@ -73,7 +73,8 @@ def declare_sensor(node, name="", given=None):
     given = given or {}
     known = SENSOR_PARAMETERS if not name else {**SENSOR_PARAMETERS, **dict.fromkeys(TOPICS)}
     if unknown := sorted(given.keys() - known.keys()):
-        raise NodeError(f"'{unknown[0]}' is no parameter of a sensor: {', '.join(known)}")
+        hint = did_you_mean(unknown[0], known) or f": {', '.join(known)}"
+        raise NodeError(f"'{unknown[0]}' is no parameter of a sensor{hint}")
     types = cdr.ACCELERATION_TYPES if name else cdr.SAMPLE_TYPES
     prefix = f"{name}." if name else ""
     for key, (default, description, limits) in SENSOR_PARAMETERS.items():

@@ -11,7 +11,7 @@ from ..uncertainty import response_uncertainty
 from . import figures, panels
 from .figures import COVERAGE_FACTOR, MEASURED, MODEL, RESIDUAL
 from .page import Page
-from .quantity import percent, scaled
+from .quantity import fixed, percent, short
 
 _BEFORE, _AFTER, _BAND = "raw / sensitivity", "corrected", "± 2u"
 # Samples of a spectrum's segments, at most.
@@ -89,9 +89,9 @@ def correction_page(title, seen, summary, provenance=None, model=None, metrics=N
 
 def _metrics(section, metrics):
     for name, found in metrics.items():
-        rows = [[f"{band.band_hz[0]:.4g} to {band.band_hz[1]:.4g}", f"{100 * band.nrmse:.3f}",
-                 f"{100 * band.amplitude_error:.3f}", f"{band.phase_error_deg:.3f}",
-                 f"{100 * band.peak_error:.3f}"] for band in (*found.bands, found.total)]
+        rows = [[f"{band.band_hz[0]:.4g} to {band.band_hz[1]:.4g}", *map(fixed, (
+                     100 * band.nrmse, 100 * band.amplitude_error, band.phase_error_deg,
+                     100 * band.peak_error))] for band in (*found.bands, found.total)]
         section.table(["band [Hz]", "NRMSE [%]", "amplitude [%]", "phase [°]", "peak [%]"], rows,
                       f"Errors, {name}; the last row is of all bands together.")
 
@@ -227,8 +227,7 @@ def _response(seen, model):
 def filter_words(axis, summary):
     """What the filter of an axis is worth, from the summary of a `FilterDesign`."""
     design = summary["axes"][axis]
-    delay, own = (f"{scaled(s, 's').factor * s:.4g} {scaled(s, 's').unit}" for s in
-                  (summary["filter_delay_s"], summary["sensor_delay_s"]))
+    delay, own = (short(s, "s") for s in (summary["filter_delay_s"], summary["sensor_delay_s"]))
     return (f"Axis {axis}: corrected from {design['band_hz'][0]:.4g} to {design['band_hz'][1]:.4g} "
             f"Hz, worst error of the filter {percent(design['worst_amplitude_error'])} and "
             f"{design['worst_phase_error_deg']:.2g}°, delay {delay}, and the sensor's own {own} "

@@ -34,6 +34,29 @@ def scaled(value, unit, least=1.0):
     return Scaled(10.0**-power, _PREFIXES[power] + shown)
 
 
+def short(value, unit):
+    """A value to four digits, with the prefix that suits it.
+
+    Examples
+    --------
+    >>> short(0.0006001, "s"), short(0.018, "s"), short(0.0, "s")
+    ('600.1 µs', '18 ms', '0 s')
+    """
+    factor, shown = scaled(value, unit)
+    return f"{factor * value:.4g} {shown}"
+
+
+def fixed(value):
+    """A value to three places, without the sign of a zero.
+
+    Examples
+    --------
+    >>> fixed(-0.0002), fixed(-1.5), fixed(float("nan"))
+    ('0.000', '-1.500', 'nan')
+    """
+    return f"{round(value, 3) + 0.0:.3f}"
+
+
 def written(value, std, unit):
     """A value with its standard uncertainty and unit, both with the prefixes that suit them.
 

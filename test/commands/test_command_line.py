@@ -98,6 +98,18 @@ def test_each_help_has_examples_that_can_be_given(verb, capsys):
         assert parser.parse_args(arguments).verb == verb
 
 
+@pytest.mark.parametrize("verb", ["diagnose", "correct", "identify", "validate"])
+def test_each_help_within_fleet_has_its_own_example(verb, capsys):
+    status, out, _ = said(capsys, "fleet", verb, "--help")
+    examples = [line.strip() for line in out.partition("examples:\n")[2].splitlines()]
+    assert status == 0 and examples
+    for example in examples:
+        arguments = shlex.split(example)[1:]
+        assert arguments[:2] == ["fleet", verb]
+        parser, _, _ = _parser("fleet", arguments)
+        assert parser.parse_args(arguments).each == verb
+
+
 @pytest.mark.parametrize("verb", ["", *VERBS])
 def test_help_loads_no_numerical_library(verb):
     """Which would cost more than all else that it does."""
@@ -179,6 +191,22 @@ def test_progress_is_for_terminals_with_the_share_done_and_the_time_left():
     piped = subprocess.run([sys.executable, "-c", PROGRESS], capture_output=True, text=True,
                            cwd=ROOT)
     assert (piped.stdout, piped.stderr, piped.returncode) == ("", "", 0)
+
+
+@pytest.mark.parametrize("steps, words", [
+    # without a step for long
+    ("show('fitting', 0); time.sleep(3.2)", r"fitting: 0 % done.*00:03"),
+    # small ones after a large one
+    ("show('fitting', 0); time.sleep(2.2); show('fitting', 0.5); time.sleep(0.3)\n"
+     "    for i in range(5): show('judging', 0.5 + 0.01 * i); time.sleep(0.3)",
+     r"judging: 53 % done"),
+])
+def test_progress_does_not_stand_still(steps, words):
+    code = f"{PROGRESS.splitlines()[0]}\nwith share_done() as show:\n    {steps}\n"
+    shown = in_terminal(code + "print('the end')")
+    assert re.search(words, shown), shown
+    # nothing of it is left
+    assert re.search(r"\r +\rthe end", shown), repr(shown)
 
 
 @pytest.mark.parametrize("run", [

@@ -229,6 +229,8 @@ def test_commands_take_a_table_as_it_is(folder, capsys):
 
 
 REFUSED = [
+    ("0.0,0.1,0.2,9.81\n0.01,0.1,0.2,9.81\n", ["--unit", "g"],
+     "first line holds numbers, not names of columns"),
     ("time [s],ax,ay\n0,1,2\n", [], "frac_accel convert FILE"),
     ("time [s],x,y\n0,1,2\n", [], "column 'x' states no unit"),
     ("time,x [g]\n0,1\n", [], "column 'time' states no unit"),

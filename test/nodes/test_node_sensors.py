@@ -131,7 +131,10 @@ def test_sensors_come_and_go_at_run_time(tmp_path, models):
             for wrong, words in (({"name": "front"}, "two sensors"), ({}, "cannot be a sensor's"),
                                  ({"name": "a/b"}, "cannot be a sensor's"),
                                  ({"name": "rear", "model_file": "/nowhere"}, "/nowhere"),
-                                 ({"name": "rear", "bandwith_hz": 5.0}, "bandwith_hz"),
+                                 ({"name": "rear", "bandwith_hz": 5.0},
+                                  "'bandwith_hz' is no parameter of a sensor: did you mean "
+                                  "'bandwidth_hz'?"),
+                                 ({"name": "rear", "qqq": 5.0}, "of a sensor: model_file, "),
                                  ({"name": "rear", "bandwidth_hz": "5"}, "bandwidth_hz"),
                                  ({"name": "rear", "bandwidth_hz": -5.0}, "bandwidth_hz"),
                                  ({"name": "rear", "on_fault": "shout"}, "on_fault")):

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -15,6 +16,7 @@ from rosbags.typesys import Stores, get_typestore  # noqa: E402
 from sensor_msgs.msg import Imu  # noqa: E402
 
 from frac_accel.io import cdr  # noqa: E402
+from frac_accel.nodes._channel import _node_of  # noqa: E402
 from frac_accel.nodes._errors import NodeError  # noqa: E402
 from frac_accel.nodes._intake import (  # noqa: E402
     DirectIntake,
@@ -237,3 +239,11 @@ def test_arguments_that_are_not_for_ros_are_refused(monkeypatch, capsys):
     assert run_node(FracAccelNode) == 2
     line = capsys.readouterr().err.splitlines()[-1]
     assert "unknown argument -p: parameters come behind --ros-args" in line
+
+
+def test_a_node_that_discovery_has_not_named_yet_is_not_called_by_a_code():
+    known = SimpleNamespace(node_namespace="/axle", node_name="driver")
+    unknown = SimpleNamespace(node_namespace="_NODE_NAMESPACE_UNKNOWN_",
+                              node_name="_NODE_NAME_UNKNOWN_")
+    assert _node_of(known) == "/axle/driver"
+    assert _node_of(unknown) == "a node whose name has not come yet"

@@ -32,7 +32,7 @@ from test_node_sensors import (
     write_model,
 )
 
-from frac_accel.commands.watch import sparkline, table
+from frac_accel.commands.watch import picture, sparkline, table
 from frac_accel.io import cdr
 from frac_accel.nodes._watcher import Seen
 
@@ -123,7 +123,7 @@ def test_it_shows_what_the_corrector_says_and_quits_cleanly(tmp_path):
             assert float(row[5]) < 1000
             status = probe.statuses[-1].message
             assert status.split()[0] == row[6]
-            other.until("waiting for a corrector")
+            other.until("waiting for rear: the raw topics .* are /imu/data_raw")
             assert other.end(b"\x03") == (0, True)
         assert shown.end(b"q") == (0, True)
         assert "Traceback" not in shown.text + other.text
@@ -134,6 +134,13 @@ def test_without_a_terminal_it_says_what_to_do():
                             capture_output=True, text=True)
     line, = result.stderr.splitlines()
     assert result.returncode == 2 and "draws in a terminal" in line
+
+
+def test_where_nothing_can_be_drawn_it_says_what_to_do():
+    with Terminal({"TERM": "dumb"}) as shown:
+        assert shown.process.wait(30) == 2
+        shown.read(0.5)
+    assert "TERM=dumb" in shown.text and "ros2 topic echo" in shown.text
 
 
 def test_a_silent_corrector_and_missing_figures_are_said():
@@ -168,6 +175,38 @@ def test_of_more_sensors_than_fit_the_worst_are_shown():
     lines = drawn(sensors, 80, 24)
     assert len(lines) <= 24 and "the worst 18 of 50 sensors" in lines[0]
     assert any("/seat_47" in line and "no message" in line for line in lines)
+
+
+@pytest.mark.parametrize("width", [60, 80, 100, 140])
+def test_long_verdicts_drive_no_sensor_out_of_the_terminal(width):
+    sensors = [Seen(f"/seat_{number}/imu/data_raw", 60) for number in range(9)]
+    for sensor in sensors:
+        sensor.verdict = f"no publisher on {sensor.name}: start the sensor's driver, or remap it"
+    lines = drawn(sensors, width, 24)
+    assert len(lines) <= 24
+    assert all(any(f"/seat_{number}" in line for line in lines) for number in range(9))
+    # with room for them they are whole
+    assert "remap" in "".join(drawn(sensors[:2], width, 24))
+
+
+@pytest.mark.parametrize("width, least", [(80, 6), (100, 6), (116, 8), (140, 20)])
+def test_from_eighty_columns_both_rms_have_a_sparkline(width, least):
+    sensor = Seen("/axle/front/imu/data_raw", 60)
+    sensor.verdict = "correcting at 1000 Hz"
+    for number in range(20):
+        sensor.take({"x/raw/std": 3.0 + number, "x/corrected/std": 2.0, "received_per_s": 999.7,
+                     "latency_p99_s": 0.0264})
+    row = next(line for line in drawn([sensor], width) if "front" in line)
+    bars = re.findall("[▁-█]+", row)
+    assert len(bars) == 2 and all(len(each) >= least for each in bars)
+    assert "/axle/front" in row and "1000" in row and "26.4 ms" in row and "correcting" in row
+
+
+def test_sensors_that_are_not_the_wanted_ones_are_named():
+    known = {"/rear/imu/data_raw": Seen("/rear/imu/data_raw", 60)}
+    assert "waiting for a corrector" in str(picture({}, ["front"], 80, 24))
+    said = str(picture(known, ["front"], 80, 24))
+    assert "waiting for front" in said and "/rear/imu/data_raw" in said
 
 
 def drawn(sensors, width, height=None):

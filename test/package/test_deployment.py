@@ -73,6 +73,8 @@ def test_environment_names_files_that_an_installation_has():
     assert found["NODE"].endswith("/lib/frac_accel/corrector")
     assert found["SETUP"].split()[-1].endswith("/install/setup.bash")
     assert (ROOT / "config" / Path(found["ROS_ARGS"].split()[-1]).name).is_file()
+    # without a model it would run, and correct nothing
+    assert "model_file:=/etc/frac_accel/sensor.yaml" in found["ROS_ARGS"].split()
 
 
 @pytest.mark.ros

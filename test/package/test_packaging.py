@@ -178,12 +178,25 @@ def test_every_library_has_its_key_or_is_asked_for_in_one_line(capsys, monkeypat
     keys = yaml.safe_load(
         (ROOT / "test" / "package" / "rosdep_keys.yaml").read_text())["libraries"]
     assert libraries == set(keys)
-    assert {key for key in keys.values() if key} <= needed()
+    assert {key for key in keys.values() if key} | {"python3-rich"} <= needed()  # rich: watch
     for library in (name for name, key in keys.items() if not key):
         monkeypatch.setitem(sys.modules, library, None)
         assert main(["diagnose", "none.mcap", "--report", "report.html"]) == 2
         line, = capsys.readouterr().err.splitlines()
         assert f"pip install {library}" in line
+
+
+@pytest.mark.parametrize("library, name",
+                         [("mcap", "mcap"), ("scipy", "scipy"), ("yaml", "PyYAML")])
+def test_a_library_that_is_missing_is_one_line_and_status_2(library, name, tmp_path):
+    bag = ROOT / "bags" / "fractional_bench.mcap"
+    code = (f"import sys; sys.modules[{library!r}] = None; from frac_accel.cli import main; "
+            f"sys.exit(main(['correct', {str(bag)!r}, '--model', "
+            f"{str(bag.with_suffix('.yaml'))!r}, '-o', {str(tmp_path / 'out.mcap')!r}]))")
+    result = run([sys.executable, "-c", code])
+    assert result.returncode == 2, result.stderr
+    line, = result.stderr.splitlines()
+    assert f"the Python library {library} is missing; install it with pip install {name}" in line
 
 
 def declared_arguments(tree, function):

@@ -1,5 +1,6 @@
 """The built wheel installs with pip, uv and PyPA's installer, and works from what was installed."""
 
+import re
 import shutil
 import site
 import subprocess
@@ -103,5 +104,16 @@ def test_metadata(wheel):
     about = Parser().parsestr(text)
     assert about["Project-URL"] == f"repository, {URL}"
     assert about["Maintainer-email"] and about["Description-Content-Type"] == "text/markdown"
-    assert about.get_payload().strip() == (ROOT / "README.md").read_text().strip()
+    text, readme = about.get_payload(), (ROOT / "README.md").read_text()
+    assert f"]({URL}/raw/HEAD/docs/demo.png)" in text
+    assert f"[`docs/nodes.md`]({URL}/blob/HEAD/docs/nodes.md)" in text
+    assert text.replace(f"{URL}/raw/HEAD/", "").replace(
+        f"{URL}/blob/HEAD/", "").strip() == readme.strip()
     assert entries.split() == "[console_scripts] frac_accel = frac_accel.cli:main".split()
+
+
+def test_without_an_address_the_description_has_no_link_that_leads_nowhere():
+    shown = run(sys.executable, "setup.py", "-q", "--long-description", cwd=ROOT)
+    assert shown.returncode == 0, shown.stderr
+    assert not re.findall(r"\]\((?!http)", shown.stdout)
+    assert "`docs/nodes.md` lists topics" in shown.stdout and "frac_accel identify" in shown.stdout

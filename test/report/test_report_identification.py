@@ -15,7 +15,7 @@ from frac_accel.errors import ModelError
 from frac_accel.identification import Identification
 from frac_accel.record import Record
 from frac_accel.report.identification import identification_page
-from frac_accel.report.quantity import percent, rounded, scaled, written
+from frac_accel.report.quantity import fixed, percent, rounded, scaled, short, written
 from frac_accel.uncertainty import response_uncertainty
 
 BAG = Path(__file__).resolve().parents[2] / "bags" / "viscoelastic_bench.mcap"
@@ -163,3 +163,15 @@ def result_file(tmp_path_factory):
     path = tmp_path_factory.mktemp("result") / "r.json"
     write_json(path, identify(Record.load(BAG, axis="y"), "y", "oscillator").as_dict())
     return path.read_text()
+
+
+@pytest.mark.parametrize("value, words", [
+    (0.0006001, "600.1 µs"), (0.018, "18 ms"), (-2.666e-6, "-2.666 µs"), (0.0, "0 s")])
+def test_delays_have_prefixes(value, words):
+    assert short(value, "s") == words
+
+
+@pytest.mark.parametrize("value, words", [
+    (-0.0004, "0.000"), (-0.0006, "-0.001"), (12.3456, "12.346"), (float("nan"), "nan")])
+def test_a_zero_has_no_sign(value, words):
+    assert fixed(value) == words

@@ -25,6 +25,10 @@ def read_csv(path):
         raise BagError(f"{path}: is empty")
     names, *following = head[passed:]
     delimiter = max(";\t,", key=names.count)
+    if all(map(_is_number, names.split(delimiter))):
+        raise BagError(f"{path}: its first line holds numbers, not names of columns: put a line "
+                       "with names and units above it, such as time [s],x [m/s^2],y [m/s^2],"
+                       "z [m/s^2]")
     row = following[0] if following else ""
     units = [cell.strip() for cell in row.split(delimiter)]
     has_units = any(units) and not any(map(_is_number, units))
