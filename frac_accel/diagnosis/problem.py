@@ -319,7 +319,7 @@ class Problem:
         columns = self._decays([pole for pole in slow if pole != 0])
         if any(pole == 0 for pole in slow):
             columns = np.c_[columns, np.ones(len(columns)), self.time]
-        return _span(columns * self.used[:, None])[0]
+        return _span(columns, self.used)[0]
 
     def _decays(self, poles):
         columns = []
@@ -499,7 +499,7 @@ class Problem:
         simulated = self.simulate(effects, steps=_STEPS_OF_SLOPES if rough else _STEPS)
         self._require_bound(simulated)
         columns = self.free_columns(effects)
-        free, back = _span(columns * self.used[:, None])
+        free, back = _span(columns, self.used)
         error = (self.measured - simulated) * self.used
         components = free.T @ error
         residual = error - free @ components
@@ -657,13 +657,18 @@ class Problem:
         return {name: bool(np.ptp(self.record.reference[:, i])) for i, name in enumerate(AXES)}
 
 
-def _span(columns):
-    """Orthonormal columns that span the same space, and what makes theirs of components of it."""
-    if not columns.shape[1]:
-        return columns, np.zeros((0, 0))
-    vectors, sizes, turned = np.linalg.svd(columns, full_matrices=False)
+def _span(columns, used):
+    """Orthonormal columns that span the same space where samples count (elsewhere they are zero),
+    and what makes components of the given columns of theirs."""
+    # free motions are short: the rows without any would take most of the time and memory
+    rows = np.flatnonzero(used & columns.any(axis=1))
+    if not len(rows):
+        return np.zeros((len(columns), 0)), np.zeros((columns.shape[1], 0))
+    vectors, sizes, turned = np.linalg.svd(columns[rows], full_matrices=False)
     count = int(np.sum(sizes > 1e-6 * sizes[0]))
-    return vectors[:, :count], turned[:count].T / sizes[:count]
+    spanned = np.zeros((len(columns), count))
+    spanned[rows] = vectors[:, :count]
+    return spanned, turned[:count].T / sizes[:count]
 
 
 def acts_on_spring(effect):

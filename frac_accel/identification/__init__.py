@@ -24,8 +24,8 @@ __all__ = ["STRUCTURES", "Excitation", "Identification", "ResponsePoints", "iden
 STRUCTURES = ("auto", "classical", *_STRUCTURES)
 # glibc gives free memory back to the system from twice the largest block on that was ever freed
 # (mallopt(3), M_MMAP_THRESHOLD), and a sixth of the time went into getting it again. A block of
-# this many numbers (16 MB), freed without having been touched, lets it keep 32 MB.
-_FREED = 2 << 20
+# this many numbers (32 MB, the largest that counts), freed untouched, lets it keep 64 MB.
+_FREED = (4 << 20) - 1024
 
 
 def identify(pair: Any, axis: str = "x", structure: str = "auto",

@@ -3,8 +3,8 @@
 import dataclasses
 
 import numpy as np
-from scipy.signal import csd, welch
 
+from ..signals.averaged_spectra import coherence_of, power_of, segment_spectra
 from ..signals.thinning import close_up, legible, segment, thinned
 from .response.excitation import strongest_stretch
 
@@ -74,13 +74,12 @@ class Evidence:
 
 def _density(reference, sensor, residual, rate):
     judged = np.isfinite(residual)
-    settings = {"fs": rate, "window": "hann", "nperseg": segment(len(reference), _SEGMENT)}
-    frequency, power = welch(reference, **settings)
-    output = welch(sensor, **settings)[1]
-    left = welch(np.where(judged, residual, 0), **settings)[1] / judged.mean()
-    shared = np.abs(csd(reference, sensor, **settings)[1])**2
-    known = power * output > 0
-    coherence = np.divide(shared, power * output, out=np.zeros_like(shared), where=known)
+    length = segment(len(reference), _SEGMENT)
+    moving, answer, left = (segment_spectra(values, "hann", length)
+                            for values in (reference, sensor, np.where(judged, residual, 0)))
     return {name: legible(values) for name, values in (
-        ("frequency_hz", frequency), ("reference", np.sqrt(power)), ("output", np.sqrt(output)),
-        ("residual", np.sqrt(left)), ("coherence", coherence))}
+        ("frequency_hz", np.fft.rfftfreq(length, 1 / rate)),
+        ("reference", np.sqrt(power_of(moving) / rate)),
+        ("output", np.sqrt(power_of(answer) / rate)),
+        ("residual", np.sqrt(power_of(left) / judged.mean() / rate)),
+        ("coherence", coherence_of(moving, answer)))}

@@ -60,12 +60,16 @@ class Samples(NamedTuple):
         """One run from consecutive blocks (at least one); the first block's frame is kept."""
         if len(blocks) == 1:
             return blocks[0]
-        return cls(
-            np.concatenate([block.stamps_ns for block in blocks]),
-            np.concatenate([block.values for block in blocks]),
-            np.concatenate([block.variance for block in blocks]),
-            blocks[0].frame_id,
-        )
+        stamps = np.concatenate([block.stamps_ns for block in blocks])
+        # column by column: what is worked on later is one axis of a long record
+        values = np.concatenate([block.values for block in blocks],
+                                out=np.empty((len(stamps), 3), order="F"))
+        if all(np.isnan(block.variance).all() for block in blocks):
+            # one number that looks like as many as there are samples
+            variance = np.broadcast_to(np.nan, values.shape)
+        else:
+            variance = np.concatenate([block.variance for block in blocks])
+        return cls(stamps, values, variance, blocks[0].frame_id)
 
 
 class Correlated(Samples):

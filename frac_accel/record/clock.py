@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from ..errors import FracAccelError
 from ..signals.sample_rate import estimate_rate
@@ -97,7 +96,7 @@ class Clock:
             steps = np.diff(merged(seconds))
             return cls("uneven", float(1 / np.percentile(steps, _LONG_STEP)), 0.0,
                        np.empty(0), 0.0)
-        slope, start = np.polyfit(slot, seconds, 1)
+        slope, start = _line(slot, seconds)
         scatter = float(np.std(seconds - (slope * slot + start)))
         return cls("regular", rate, float(np.median(place)) / rate, slot, scatter)
 
@@ -196,6 +195,7 @@ def slots_of(place):
     scatter = scatter - np.median(scatter)
     if np.mean(np.abs(scatter) > _SCATTER) < _RARE:
         return nearest
+    from scipy.ndimage import median_filter
     count = np.arange(len(place))
     ahead = median_filter(place - count, _NEIGHBOURS, mode="nearest")
     lost = np.round(ahead - ahead[0]) + np.round(ahead[0])
@@ -230,12 +230,20 @@ def long_term_rate(stamps):
 def _grown(seconds, slots):
     """Line through the first stamps, over ever more of them."""
     length = len(slots)
-    line = np.polyfit(slots, seconds[:length], 1)
+    line = _line(slots, seconds[:length])
     while length < len(seconds):
         length = min(2 * length, len(seconds))
         place = (seconds[:length] - line[1]) / line[0]
-        line = np.polyfit(np.round(place), seconds[:length], 1)
+        line = _line(np.round(place), seconds[:length])
     return line
+
+
+def _line(place, values):
+    """Slope of the least-squares line, and its value at 0; `np.polyfit` takes ten times as long."""
+    middle, mean = place.mean(), values.mean()
+    away = place - middle
+    slope = away @ (values - mean) / (away @ away)
+    return slope, mean - slope * middle
 
 
 def _batches(seconds):

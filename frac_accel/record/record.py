@@ -250,7 +250,7 @@ class Record:
         for topic in (one, two):
             _require_signal(topic, column)
         if np.array_equal(one.stamps_ns, two.stamps_ns):
-            two.clock = one.clock
+            two.clock, two.stamps_ns = one.clock, one.stamps_ns
         offset = clock_offset(one, two, int(one.stamps_ns[0]))
         taken_out = 0.0
         words = [f"the {topic.name} holds each value for {length:.3g} samples: the first of them "

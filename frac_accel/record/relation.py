@@ -120,7 +120,7 @@ def refined(reference, sensor, valid, sampling_rate_hz, guess_s, band_hz=None):
     first, last = max(0, -middle), len(valid) - max(0, middle)
     size = min(_LONGEST, max(_SHORTEST, 2 * (last - first) // (_STRETCHES + 1)))
     starts = np.linspace(first, last - size, _STRETCHES).astype(int)
-    means = [values[valid].mean(axis=0) for values in (reference, sensor)]
+    means = [_mean(values, valid) for values in (reference, sensor)]
     window = np.hanning(size)[:, None]
     cross, powers = [], []
     for start in starts:
@@ -170,17 +170,27 @@ def products(reference, sensor, valid, lags):
     sizes = [float(np.max(np.abs(values))) for values in (reference, sensor)]
     if last - first < BLOCKS * _FEWEST or not (min(sizes) > _SMALLEST and max(sizes) < _LARGEST):
         return None
-    x, y = (np.where(valid[:, None], values - values[valid].mean(axis=0), 0.0)
-            for values in (reference, sensor))
+    means = [_mean(values, valid) for values in (reference, sensor)]
+    lags = lags.tolist()
     edges = np.linspace(first, last, BLOCKS + 1).astype(int)
     own, shared, other = [], [], []
     for start, stop in zip(edges[:-1], edges[1:]):
-        part = x[start:stop]
-        middle = y[start + int(lags[len(lags) // 2]):][:stop - start]
+        # all that any lag needs of a block: a copy of the whole record would take most memory
+        part, around = (np.where(valid[rows, None], values[rows] - mean, 0.0)
+                        for values, mean, rows in zip(
+                            (reference, sensor), means,
+                            (slice(start, stop), slice(start + lags[0], stop + lags[-1]))))
+        later = [around[lag - lags[0]:][:stop - start] for lag in lags]
+        middle = later[len(lags) // 2]
         own.append([part.T @ part])
-        shared.append([part.T @ y[start + lag:stop + lag] for lag in lags.tolist()])
+        shared.append([part.T @ values for values in later])
         other.append([middle.T @ middle])
     return np.array(own), np.array(shared), np.array(other)
+
+
+def _mean(values, valid):
+    """Mean of the valid rows, without a copy where all are."""
+    return (values if valid.all() else values[valid]).mean(axis=0)
 
 
 def _explained(own, shared, other):

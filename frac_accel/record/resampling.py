@@ -1,9 +1,9 @@
-"""Values at other instants: band-limited, without aliases, whatever the ratio of the rates."""
+"""Values at other instants: band-limited, without aliases, whatever the ratio of the rates.
+
+`scipy.signal` and `scipy.interpolate` are imported where they are used: most records need neither.
+"""
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.ndimage import map_coordinates
-from scipy.signal import firwin, oaconvolve, resample_poly
 
 from .clock import merged
 
@@ -57,6 +57,8 @@ def band_limited(values, rate_hz, start_s, target_hz, target_start_s, count):
     ndarray, shape (count, 3)
         Meaningless closer than `REACH` intervals of the lower rate to the ends of `values`.
     """
+    from scipy.ndimage import map_coordinates
+    from scipy.signal import firwin, oaconvolve, resample_poly
     lower = min(rate_hz, target_hz)
     up = int(np.ceil(_OVERSAMPLED * lower / rate_hz))
     half = int(np.ceil(REACH * up * rate_hz / lower))
@@ -98,6 +100,7 @@ def within(values, rate_hz, band_hz, wrong, missing):
     -------
     ndarray, shape (n,)
     """
+    from scipy.signal import firwin, oaconvolve
     half = min(int(np.ceil(_INNER_TAPS * rate_hz / band_hz)), len(values) - 1)
     taps = firwin(2 * half + 1, (1 + _INNER) / 2 * band_hz, window=("kaiser", _KAISER), fs=rate_hz)
 
@@ -174,6 +177,7 @@ def filled(slot, values):
     steps = np.diff(place)
     long = np.repeat(steps - 1 > _SPLINED, np.maximum(steps - 1, 0))
     if len(missing):
+        from scipy.interpolate import CubicSpline
         result[missing] = CubicSpline(place, values)(missing)
         result[missing[long]] = np.stack(
             [np.interp(missing[long], place, values[:, i]) for i in range(values.shape[1])], 1)
@@ -191,6 +195,7 @@ def on_grid(seconds, values, rate_hz):
     present : ndarray of bool, shape (m,)
         False within gaps of more than three of the longer steps.
     """
+    from scipy.interpolate import CubicSpline
     seconds, values = merged(seconds, values)
     steps = np.diff(seconds)
     grid = seconds[0] + np.arange(int((seconds[-1] - seconds[0]) * rate_hz) + 1) / rate_hz

@@ -69,13 +69,17 @@ class Convolution:
         """Complex frequencies [rad/s] on which a transfer function is needed."""
         return self._s
 
-    def response(self, transfer):
-        """Responses of systems, shape (..., n), from their transfer functions (...) at `s`."""
+    def response(self, transfer, consumed=False):
+        """Responses of systems, shape (..., n), from their transfer functions (...) at `s`.
+
+        Where these may be `consumed`, they are overwritten, which spares a long record a copy.
+        """
         if transfer.ndim > 1:
             # one after the other: of a long record, all transforms at once take most memory
-            return np.stack([self.response(each) for each in transfer])
-        spectrum = self._spectrum * transfer
-        self._smooth_at_nyquist(spectrum, transfer[-1:])
+            return np.stack([self.response(each, consumed) for each in transfer])
+        last = transfer[-1:].copy()
+        spectrum = np.multiply(self._spectrum, transfer, out=transfer if consumed else None)
+        self._smooth_at_nyquist(spectrum, last)
         return irfft(spectrum, self._length)[:self._n] * self._undamped(1, self._n)
 
     def response_between(self, transfer, factor, count):

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from .averaged_spectra import power_of, segment_spectra
+
 # Points of a signal after `envelope`: more than a screen has columns, twice.
 MOST_POINTS = 4000
 # Significant digits of what is only drawn.
@@ -57,8 +59,8 @@ def thinned(x, values, most=MOST_POINTS):
 
 def close_up(reference):
     """Number of samples in which single oscillations can be seen."""
-    from scipy.signal import welch
-    frequency, power = welch(reference, nperseg=segment(len(reference)))
+    length = segment(len(reference))
+    frequency, power = np.fft.rfftfreq(length), power_of(segment_spectra(reference, "hann", length))
     return int(_PERIODS * power.sum() / (power @ frequency))
 
 

@@ -299,7 +299,7 @@ class AxisSimulator:
         filtering = [effect for effect in behind if effect.stage < GAIN]
         if filtering:
             conditioner = Convolution(moving, self._rate * steps, oversampled=steps > 1)
-            moving = conditioner.response(_product(filtering, conditioner.s))
+            moving = conditioner.response(_product(filtering, conditioner.s), consumed=True)
         gain = _product([effect for effect in behind if effect.stage >= GAIN], np.array([1j]))
         start *= _static_gain(lambda s: _product(filtering, s)) if start else 0.0
         if delay_s or ratio != 1:

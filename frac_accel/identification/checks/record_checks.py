@@ -148,13 +148,15 @@ def _decimal_step(values, largest):
 
 def _collinear(pair):
     """What cannot be told where axes move in proportion."""
-    together = _dependent(pair.reference[pair.valid])
+    reference, sensor = (values if pair.valid.all() else values[pair.valid]
+                         for values in (pair.reference, pair.sensor))
+    together = _dependent(reference)
     if together:
         return [f"the reference's axes {together} do not move independently of each other: "
                 "cross-axis sensitivity cannot be told from these data"]
-    together = _dependent(pair.sensor[pair.valid])
+    together = _dependent(sensor)
     # axes that all answer to the only one that moves are no wonder
-    if together and len(_excited(pair.reference[pair.valid])) == len(AXES):
+    if together and len(_excited(reference)) == len(AXES):
         return [f"the sensor's axes {together} depend on each other although the reference's do "
                 "not: they are no outputs of separate axes"]
     return []

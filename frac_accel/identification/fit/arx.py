@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from scipy.signal import lfilter
 
 from ...errors import IdentificationError
 from ...model.core import Arx
@@ -399,12 +398,12 @@ class _Problem:
         right = b @ self.inputs
         right[:self.poles] += initial
         denominator = np.r_[1, a]
-        return lfilter([1], denominator, right), denominator
+        return _driven(denominator, right), denominator
 
     def slopes(self, output, denominator=None):
         """Derivatives of the model by theta where its output is `output`, shape (p, rows)."""
         def filtered(row):
-            return row if denominator is None else lfilter([1], denominator, row)
+            return row if denominator is None else _driven(denominator, row)
         slopes = np.zeros((2 * self.poles + len(self.inputs), self.rows))
         self.put_past(slopes, output, denominator)
         initial = self.poles + len(self.inputs)
@@ -418,7 +417,7 @@ class _Problem:
 
     def put_past(self, slopes, output, denominator):
         """Write the derivatives by a, which are the only ones that depend on the output."""
-        past = -output if denominator is None else -lfilter([1], denominator, output)
+        past = -output if denominator is None else -_driven(denominator, output)
         for i in range(self.poles):
             slopes[i, i + 1:] = past[:self.rows - i - 1]
 
@@ -516,3 +515,10 @@ def _result(record, problem, orders, theta, rate, lag_s, uncertainty):
     return ArxFit(names, values, factors @ covariance @ factors.T, full,
                   (orders, theta[:count]), (), None, 0.0, np.nan, orders,
                   rate, lag_s)
+
+
+def _driven(denominator, values):
+    """What values become behind 1/A(z)."""
+    # imported here: most identifications fit no such model
+    from scipy.signal import lfilter
+    return lfilter([1], denominator, values)

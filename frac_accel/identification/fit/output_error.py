@@ -13,7 +13,7 @@ from ...signals.kept import kept
 from ...signals.normal_equations import solve
 from ..response.excitation import strongest_stretch
 from ..response.frequency_response import averaged_response, bulk_delay, phase_delay
-from .uncertainty import sandwich, white_noise
+from .uncertainty import sandwich, spectrum_room, white_noise
 
 # Samples at both ends that the band-limited simulation cannot know, besides the unknown start.
 _EDGE = 32
@@ -32,6 +32,8 @@ _HOPELESS = 1.5
 # of it: that it was not much larger than the output.
 _FAINT = 1e-3
 _OVER = -20.0
+# Logarithm of the share of it that is nothing beside any number.
+_NOTHING = -700.0
 # Energy, in variances of the noise, of a free motion that noise alone may show: the largest of a
 # spectrum of 1e5 lines has 23.
 _FEIGNED = 50.0
@@ -207,6 +209,7 @@ class _Problem:
         self.blocks = [slice(at, at + _LINES) for at in range(0, len(s), _LINES)]
         self.prepared = [structure.prepare(s[lines]) for lines in self.blocks]
         self.rows_of = {}
+        self.width = spectrum_room(self.n)
         edge = min(_EDGE, self.n // 8)
         used = np.ones(self.n, bool) if valid is None else valid.copy()
         used[:edge] = used[-edge:] = False
@@ -314,24 +317,27 @@ class _Problem:
     def _rows(self, theta):
         own, delay = theta[:-1], theta[-1] / self.rate - self.lag_s
         # one that is over long before the first used sample is none
-        decays = [np.exp(-rate * self.instants)
-                  for rate in self.structure.decay_rates(own, self.instants[-1])
+        decays = [-rate for rate in self.structure.decay_rates(own, self.instants[-1])
                   if -rate * self.instants[0] > _OVER]
         pole, pole_slopes = self.structure.mode(own)
         rings = pole is not None and pole.real * self.instants[0] > _OVER
-        swing = _exponential(0.0, pole / self.rate, self.n)[self.judged] if rings else None
-        free = [swing.real, swing.imag, *decays] if rings else decays
-        count = 2 + len(free)
-        transfers = self.transfers(own, delay)
-        # with room for what `result` may add
-        room = np.empty((count + len(transfers) + 1, len(self.sensor)))
-        rows = room[:-2]
+        swing = self.swing(pole) if rings else None
+        count = 2 + 2 * rings + len(decays)
+        transfer, *slopes = self.transfers(own, delay)
+        # with room for what `result` may add; what is never written to takes no memory
+        room = np.zeros((count + len(slopes) + 3, self.width))
+        rows = room[:-2, :len(self.sensor)]
         rows[1] = 1.0
-        for row, values in zip(rows[2:], free):
-            row[:] = values
-        for place in (0, *range(count, len(rows))):
-            simulated = self.convolution.response(transfers.pop(0))
-            rows[place] = simulated[_WAY:][self.judged]
+        if rings:
+            rows[2, :len(swing)], rows[3, :len(swing)] = swing.real, swing.imag
+        for row, rate in zip(rows[2 + 2 * rings:count], decays):
+            last = np.searchsorted(self.instants, _NOTHING / rate)
+            np.exp(rate * self.instants[:last], out=row[:last])
+        for place in range(count, len(rows) - 1):
+            self.respond(slopes.pop(0), rows[place])
+        # the derivative of a delay by one sample
+        self.respond(transfer * self.convolution.s * (-1 / self.rate), rows[-1])
+        self.respond(transfer, rows[0])
         known = rows[:count]
         # what was over before the first used sample fades out of the fit instead of dropping out
         faint = np.diag(np.r_[0.0, 0.0, np.full(count - 2, _FAINT**2)])
@@ -345,22 +351,32 @@ class _Problem:
         real = energy > _FEIGNED * noise
         if real:
             # with the pole, what it left behind changes as well; what noise feigns of it does not
-            change = (linear[2] - 1j * linear[3]) / linear[0] * self.instants * swing
+            change = (linear[2] - 1j * linear[3]) / linear[0] * self.instants[:len(swing)] * swing
             for row, slope in zip(rows[count:-1], pole_slopes):
-                row += (slope * change).real
+                row[:len(swing)] += (slope * change).real
         return _Rows(room, rows, linear, faint, residual, swing, bool(real),
                      float((energy / len(residual) - mean**2) / self.size**2))
 
+    def respond(self, transfer, row):
+        """Write a response at the judged samples; its transfer function is overwritten."""
+        row[:] = self.convolution.response(transfer, consumed=True)[_WAY:][self.judged]
+
+    def swing(self, pole):
+        """Free motion with a pole at the judged samples, as long as there is anything of it."""
+        last = np.searchsorted(self.instants, _NOTHING / pole.real) if pole.real < 0 else self.n
+        # as many from the record's start
+        count = round(self.instants[:last][-1] * self.rate) + 1
+        judged = self.judged if isinstance(self.judged, slice) else self.judged[:count]
+        return _exponential(0.0, pole / self.rate, count)[judged]
+
     def transfers(self, own, delay):
-        """Responses that give the simulated output, and its derivatives by theta, as a list."""
+        """Responses that give the simulated output, and its derivatives by `own`, as a list."""
         s = self.convolution.s
         turn = _exponential(-s[0] * delay, -(s[1] - s[0]) * delay, len(s))
-        found = [np.empty(len(s), complex) for _ in range(len(own) + 2)]
+        found = [np.empty(len(s), complex) for _ in range(len(own) + 1)]
         for lines, prepared in zip(self.blocks, self.prepared):
             response, slopes = self.structure.gradient(prepared, own)
-            # last the derivative of a delay by one sample
-            for values, part in zip(found, (response, *slopes, response * (-1 / self.rate)
-                                            * s[lines])):
+            for values, part in zip(found, (response, *slopes)):
                 np.multiply(part, turn[lines], out=values[lines])
         return found
 
@@ -504,17 +520,18 @@ class _Problem:
             if found.swing is not None and (stuck.any() or not found.real):
                 # what noise, or a tone that never decays, can feign of a swing tells no frequency
                 order += [len(jacobian), len(jacobian) + 1]
-                jacobian = found.room
-                np.multiply(self.instants, found.swing.real, out=jacobian[-2])
-                np.multiply(self.instants, found.swing.imag, out=jacobian[-1])
+                jacobian = found.room[:, :len(residual)]
+                for row, part in zip(jacobian[-2:], (found.swing.real, found.swing.imag)):
+                    np.multiply(self.instants[:len(part)], part, out=row[:len(part)])
+            room = found.room[:len(jacobian)]
             if held.any():
-                jacobian, order = jacobian[order], range(len(order))
+                jacobian, order, room = jacobian[order], range(len(order)), None
             free = np.flatnonzero(np.r_[True, ~held, True])
-            within = sandwich(jacobian.T, residual, self.used)
-            if stuck.any():
-                # the bound is ours, not the sensor's: how far the data would go is not known better
-                beyond = solve(jacobian @ jacobian.T, jacobian @ residual)
-                within += np.outer(beyond, beyond)
+            # the bound is ours, not the sensor's: how far the data would go is not known better
+            beyond = solve(jacobian @ jacobian.T, jacobian @ residual) if stuck.any() \
+                else np.zeros(len(jacobian))
+            within = sandwich(jacobian.T, residual, self.used, room)
+            within += np.outer(beyond, beyond)
             within = within[np.ix_(order, order)]
             covariance = np.zeros_like(covariance)
             covariance[np.ix_(free, free)] = within[:len(free), :len(free)]
@@ -541,8 +558,8 @@ class _Rows(NamedTuple):
 
     Attributes
     ----------
-    room : ndarray, shape (p + 2, m)
-        The rows, and two more that are free.
+    room : ndarray, shape (p + 2, spectrum_room(n))
+        The rows, each with what its spectrum needs more, and two that are free.
     rows : ndarray, shape (p, m)
         Simulated output, constant, free motions and derivatives by theta.
     linear : ndarray
@@ -550,7 +567,8 @@ class _Rows(NamedTuple):
     faint : ndarray
         What is known of them besides, as a normal matrix.
     residual : ndarray, shape (m,)
-    swing : ndarray of complex, shape (m,), or None
+    swing : ndarray of complex, shape (l,), or None
+        At the first samples, up to where nothing is left of it.
     real : bool
         Whether the swing is more than noise could feign.
     free_share : float

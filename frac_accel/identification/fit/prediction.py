@@ -2,7 +2,7 @@
 
 from ...model import SensorModel
 from ...model.effects import identified_effect
-from ...simulation import simulate
+from ...simulation import AxisSimulator
 
 
 def predicted(structure, fit, reference, sampling_rate_hz, lag_s):
@@ -27,4 +27,4 @@ def predicted(structure, fit, reference, sampling_rate_hz, lag_s):
     # the pair's lag belongs to the stamps, not to the sensor
     model = SensorModel(structure.core(fit), [identified_effect("delay_s", fit["delay_s"] - lag_s),
                                               identified_effect("offset", fit["offset"])])
-    return simulate(model, reference, sampling_rate_hz, axis="x", initial="steady")
+    return AxisSimulator(reference, sampling_rate_hz).simulate(model.axes[0])

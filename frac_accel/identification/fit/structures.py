@@ -152,7 +152,9 @@ class FractionalStructure(OscillatorStructure):
     def gradient(self, prepared, theta):
         (log_f0, log_zeta, order), factors = _natural(theta)
         log_u = prepared[1] - log_f0 - np.log(2 * np.pi)
-        square = np.exp(2 * log_u)
+        # not from the logarithm: an exponential of complex numbers costs as much as all else
+        u = prepared[0] * (np.exp(-log_f0) / (2 * np.pi))
+        square = u * u
         damper = 2 * np.exp(log_zeta + order * log_u)
         response = 1 / (square + damper + 1)
         twice = response * response

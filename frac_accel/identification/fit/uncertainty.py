@@ -20,7 +20,7 @@ _QUIET = 0.05
 _BLOCK = 1 << 15
 
 
-def sandwich(jacobian, residual, used):
+def sandwich(jacobian, residual, used, room=None):
     r"""Covariance :math:`(J^T J)^{-1} J^T \Gamma J (J^T J)^{-1}`.
 
     The residual's autocovariance :math:`\Gamma` comes from its smoothed spectrum (L. Ljung, *System
@@ -33,6 +33,8 @@ def sandwich(jacobian, residual, used):
     residual : ndarray, shape (m,)
     used : ndarray of bool, shape (n,)
         Where the m rows stand in the record.
+    room : ndarray of float, shape (p, spectrum_room(n)), optional
+        Memory that is overwritten, also where the jacobian lies in it, each column in one row.
 
     Returns
     -------
@@ -41,9 +43,8 @@ def sandwich(jacobian, residual, used):
     """
     gram = jacobian.T @ jacobian
     scale = np.sqrt(np.diag(gram))
-    # the smoothed spectrum reaches over lags of a few times the root of the record
-    length = next_fast_len(len(used) + int(_REACH * np.sqrt(len(used))), real=True)
-    spectra = _spectra(jacobian.T, scale, used, length)
+    length = _padded(len(used))
+    spectra = _spectra(jacobian.T, scale, used, length, room)
     power = np.square(np.abs(_spectra(residual[None], np.ones(1), used, length)[0]))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     root = vectors / np.sqrt(np.maximum(values, 1e-14 * values[-1]))
@@ -52,8 +53,10 @@ def sandwich(jacobian, residual, used):
     # by blocks: of a long record, copies of all spectra would take most memory
     blocks = [slice(start, start + _BLOCK) for start in range(0, len(power), _BLOCK)]
     for lines in blocks:
-        spectra[:, lines] = fitted = root.T @ spectra[:, lines]
-        left[lines] = len(residual) - np.sum(fitted.real**2 + fitted.imag**2, axis=0)
+        # real and imaginary parts side by side: the product is one of real numbers
+        part = spectra[:, lines].view(float)
+        part[:] = fitted = root.T @ part
+        left[lines] = len(residual) - np.einsum("pl,pl->l", fitted, fitted).reshape(-1, 2).sum(1)
     width = max(5, int(len(power) / np.sqrt(len(used))))
     power, left = (uniform_filter1d(v, width, mode="reflect") for v in (power, left))
     smooth = power / np.maximum(left, _LEAST * len(residual))
@@ -71,10 +74,21 @@ def sandwich(jacobian, residual, used):
     return root @ root.T
 
 
-def _spectra(rows, scale, used, length):
+def spectrum_room(count):
+    """Numbers that `sandwich` needs for the spectrum of a column of a record of so many samples."""
+    return 2 * (_padded(count) // 2 + 1)
+
+
+def _padded(count):
+    """Samples of a spectrum: smoothed, it reaches over lags of a few times the record's root."""
+    return next_fast_len(count + int(_REACH * np.sqrt(count)), real=True)
+
+
+def _spectra(rows, scale, used, length, room=None):
     """Spectra of rows over their sizes, put where `used` is, shape (p, length // 2 + 1)."""
     first, last = np.flatnonzero(used)[[0, -1]]
-    spectra = np.empty((len(rows), length // 2 + 1), complex)
+    spectra = np.empty((len(rows), length // 2 + 1), complex) if room is None \
+        else room.view(complex)
     for spectrum, row, size in zip(spectra, rows, scale):
         row = row / size
         # where the rows begin turns all spectra alike; only gaps need their place

@@ -65,9 +65,11 @@ class Data:
         progress("checking the record")
         record = check_record(pair, axis)
         pair = record.pair
-        sensor = pair.sensor[:, column]
+        # views where an axis lies in one piece
+        reference, sensor = (np.ascontiguousarray(values[:, column])
+                             for values in (pair.reference, pair.sensor))
         progress("measuring the frequency response")
-        return cls(record, pair, pair.reference[:, column].copy(), sensor.copy(),
+        return cls(record, pair, reference, sensor,
                    float(np.std(sensor[pair.valid])), MeasuredResponse.of(pair, axis), progress,
                    *excited, axis)
 

@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from scipy.signal.windows import tukey
 
 from ...errors import FracAccelError
 from ...model import AxisModel
@@ -156,7 +155,7 @@ def band_fits(measured, simulated, sampling_rate_hz, bands):
     list of BandFit
     """
     # a tenth at either end, where leakage would count
-    taper = tukey(len(measured), 0.2)
+    taper = _tapered(len(measured))
     error, moving = measured - simulated, measured - measured.mean()
     # a mean error belongs to the band that begins at zero
     error = error - (bands[0][0] > 0) * error.mean()
@@ -183,6 +182,12 @@ def band_fits(measured, simulated, sampling_rate_hz, bands):
                                           / np.sum(power[inside])))
     return [BandFit(tuple(map(float, band)), float(ratio), floor)
             for band, ratio, floor in zip(bands, nrmse, floors)]
+
+
+def _tapered(count):
+    """Taper that rises and falls as half a cosine over a tenth at either end, shape (count,)."""
+    place = np.arange(count) / (0.1 * (count - 1))
+    return 0.5 - 0.5 * np.cos(np.pi * np.minimum(np.minimum(place, place[::-1]), 1))
 
 
 def _residual_words(tests, nrmse):

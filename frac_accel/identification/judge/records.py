@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from scipy.stats import chi2
 
 from .residual_tests import SIGNIFICANCE, p_words
 
@@ -156,6 +155,7 @@ def combine(fits):
     place = np.ix_(shared, shared)
     statistic = _statistic([point[shared] for point in points],
                            [matrix[place] for matrix in spreads])
+    from scipy.stats import chi2
     freedom = int((len(fits) - 1) * shared.sum())
     p_value = float(chi2.sf(statistic, freedom))
     disagree = p_value < SIGNIFICANCE

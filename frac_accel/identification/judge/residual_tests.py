@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.signal import lfilter
 from scipy.special import chdtrc, ndtri
 
 from ...errors import FracAccelError
@@ -228,6 +227,7 @@ def _moments(error, reference, used, lags, gradient, noise):
         gram, right = stretch.gram(np.array([1.0, 0.0]), None), stretch.right()
         coloured = gram if len(denominator) == 1 else stretch.gram(*_autoregressive(denominator, n))
         return gram, variance * coloured, right
+    from scipy.signal import lfilter
     width = len(lags) + len(others)
     gram, coloured, right = np.zeros((width, width)), np.zeros((width, width)), np.zeros(width)
     reach = lags[-1]
@@ -288,9 +288,17 @@ class _Stretch:
         begin = self.reach - lag + self.start
         return self.padded[begin + first:begin + (self.stop - self.start if last is None else last)]
 
+    def at_lags(self, row):
+        """Products of a row with the reference at each lag; in blocks that caches hold."""
+        found = np.zeros(len(self.lags))
+        for first in range(0, len(row), _BLOCK):
+            part = row[first:first + _BLOCK]
+            found += [part @ self.shifted(lag, first, first + len(part)) for lag in self.lags]
+        return found
+
     def right(self):
         """X'error."""
-        return np.array([*(self.error @ self.shifted(lag) for lag in self.lags),
+        return np.array([*self.at_lags(self.error),
                          *(self.error @ row for row in self.others)])
 
     def gram(self, covariance, weigh):
@@ -304,12 +312,12 @@ class _Stretch:
         # one after the other: of a long record, all weighed rows would take most memory
         for place, row in enumerate(self.others, count):
             weighed = row if weigh is None else weigh(row)
-            gram[:count, place] = [weighed @ self.shifted(lag) for lag in self.lags]
+            gram[:count, place] = self.at_lags(weighed)
             gram[place, count:] = [weighed @ other for other in self.others]
         gram[count:, :count] = gram[:count, count:].T
         first = self.shifted(self.lags[0])
         weighed = first if weigh is None else weigh(first)
-        gram[0, :count] = gram[:count, 0] = [weighed @ self.shifted(lag) for lag in self.lags]
+        gram[0, :count] = gram[:count, 0] = self.at_lags(weighed)
         before, last = (self.padded[self.reach - self.lags + place - 1]
                         for place in (self.start, self.stop))
         # the weighed reference a sample before the stretch, and at its last one

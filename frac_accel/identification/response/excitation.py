@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from scipy.signal import medfilt
 
 from ...errors import IdentificationError
 from ...signals.averaged_spectra import coherence_of, power_of, segment_spectra
@@ -124,7 +123,8 @@ def excited_band(reference, sensor, sampling_rate_hz):
                             for values in (reference, sensor)))
     shared = np.interp(frequency, np.linspace(0, sampling_rate_hz / 2, len(shared)), shared)
     strong = ((power > _FLOOR * power.max()) & (shared > _COHERENT)).astype(float)
-    most = np.flatnonzero(medfilt(strong, 5))
+    # where most of five neighbours are strong
+    most = np.flatnonzero(np.convolve(strong, np.ones(5), "same") > 2)
     if not len(most):
         most = np.flatnonzero(power > 0.1 * power.max())
     if not len(most):

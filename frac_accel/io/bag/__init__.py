@@ -38,6 +38,10 @@ __all__ = [
     "write_bag",
 ]
 
+# Blocks of a topic that are put together at a time: many small arrays leave memory in pieces.
+_TOGETHER = 64
+
+
 def read_bag(path: str | Path, topics: Sequence[str] | None = None) -> dict[str, Samples]:
     """Samples of whole topics.
 
@@ -65,12 +69,18 @@ def read_bag(path: str | Path, topics: Sequence[str] | None = None) -> dict[str,
             if info.type_name in cdr.ACCELERATION_TYPES and info.count
         ]
     blocks: dict[str, list[Samples]] = {name: [] for name in topics}
+    latest: dict[str, list[Samples]] = {name: [] for name in topics}
     for name, samples in reader.samples(topics):
-        blocks[name].append(samples)
+        latest[name].append(samples)
+        if len(latest[name]) == _TOGETHER:
+            blocks[name].append(Samples.concatenate(latest[name]))
+            latest[name].clear()
     for name, of_topic in blocks.items():
+        of_topic += latest.pop(name)
         if not of_topic:
             raise BagError(f"{path}: topic {name} has no messages")
-    return {name: Samples.concatenate(of_topic) for name, of_topic in blocks.items()}
+    # one after the other, each without its blocks: a long topic is in memory twice only by itself
+    return {name: Samples.concatenate(blocks.pop(name)) for name in list(blocks)}
 
 
 def read_temperature(path: str | Path, topic: str = TEMPERATURE_TOPIC) -> Temperatures:

@@ -40,6 +40,9 @@ _MAX_DESCRIPTIONS_BYTES = 8 * 2**20  # schemas and channels that are kept, toget
 _UNSUSPECTED_TOTAL = 256 * 2**20
 _MOST_DAMAGE = 100  # records in a chunk that do not belong there or are damaged; warnings
 _LOOSE_BYTES = 2**20
+# Messages of one length in a row after which more of them are looked for at once, and how many at
+# first.
+_STREAK, _AHEAD = 8, 64
 _MAX_TIME = 2**63 - 1
 _RECORD = struct.Struct("<BQ")
 _CHUNK = struct.Struct("<QQQII")
@@ -47,6 +50,7 @@ _FOREIGN_MAGIC = {
     b"#ROSBAG": "is a ROS 1 bag; convert it first (rosbags-convert)",
     b"\x28\xb5\x2f\xfd": "is compressed as a file; decompress it first (zstd -d)",
 }
+_RECORD_HEADER = np.dtype([("opcode", "u1"), ("length", "<u8")])
 _MESSAGE_HEADER = np.dtype(
     {
         "names": ["channel_id", "sequence", "log_time", "publish_time"],
@@ -267,7 +271,7 @@ class McapFile:
         unpack, header_size = _RECORD.unpack_from, _RECORD.size
         # not lists: a chunk may be nothing but the smallest of messages
         offsets, lengths = array("q"), array("q")
-        position, end, bad = 0, len(body), 0
+        position, end, bad, last, streak = 0, len(body), 0, 0, 0
         while position + header_size <= end:
             opcode, length = unpack(body, position)
             position += header_size
@@ -277,6 +281,14 @@ class McapFile:
                 if length >= 22:
                     offsets.append(position)
                     lengths.append(length)
+                    streak = streak + 1 if length == last else 0
+                    last = length
+                    if streak == _STREAK:
+                        step, alike = header_size + length, _alike(body, position + length, length)
+                        offsets.frombytes((position + step * np.arange(1, alike + 1)).tobytes())
+                        lengths.extend(array("q", [length]) * alike)
+                        position += step * alike
+                        streak = 0
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 kind = Schema if opcode == Opcode.SCHEMA else Channel
                 content = body[position : position + min(length, _MAX_DESCRIPTION_BYTES)]
@@ -344,6 +356,20 @@ class _LooseRun:
             self._file.segments.append(Segment(self._first_ns, order, size, size, 0, None))
         self._first_ns = None
         self._start = self._end
+
+
+def _alike(body: bytes, position: int, length: int) -> int:
+    """Number of messages of this length that follow each other from a position on."""
+    most = (len(body) - position) // (_RECORD.size + length)
+    heads = np.ndarray(most, _RECORD_HEADER, body, position, (_RECORD.size + length,))
+    found, look = 0, _AHEAD
+    while found < most:
+        part = heads[found : found + look]
+        other = np.flatnonzero((part["opcode"] != Opcode.MESSAGE) | (part["length"] != length))
+        if len(other):
+            return found + int(other[0])
+        found, look = found + len(part), 4 * look
+    return found
 
 
 def _decompressed(data: bytes, segment: Segment) -> bytes:
