@@ -220,11 +220,16 @@ def _imitators(engine, best, takes, left):
                 if best.effects[cause].is_constant and taken < _RESEMBLES * rest}
     # a delay is common beside any filter
     odd = [cause for cause, effect in filters.items() if not effect.everyday] or list(filters)
-    if len(odd) == 1 and takes.get(odd[0], np.inf) > rest * (
-            _RESEMBLES if filters[odd[0]].everyday or share < _MOSTLY else _IMITATES):
+    # those that take little beside the largest may only mend what that lacks
+    most = max(takes.get(cause, np.inf) for cause in odd)
+    main = [cause for cause in odd if takes.get(cause, np.inf) > _MENDS * most]
+    clear = main if len(main) == 1 and most > rest * (
+        _RESEMBLES if filters[main[0]].everyday or share < _MOSTLY else _IMITATES) else []
+    if clear == odd:
         return {}
     linear = [cause for cause, effect in best.effects.items()
               if cause in takes and (cause in filters or effect.is_constant)
+              and cause not in clear
               and not _stands_out_at_its_peak(engine, best, cause, takes[cause])]
     return dict.fromkeys(linear, more.format(share))
 

@@ -54,6 +54,9 @@ _CLEARLY = 0.9
 # Share of what is left (power) that may follow the motion in a record that counts as consistent,
 # where so little is left that it need not be noise.
 _HINT = 0.1
+# Share of what each named cause takes (RMS) up to which another one is minor; of a filter, which
+# may mend what a named one lacks.
+_MINOR, _MINOR_FILTER = 0.1, 0.05
 # Share by which a parameter may move when what is only suspected is left out.
 _OTHERS = 0.25
 # Standard uncertainties from the model's own value by which a parameter has moved.
@@ -459,13 +462,24 @@ def _with_identified(engine, best, fitted, stds):
     return (wider, engine.uncertainties(wider)) if better.is_relevant else (fitted, stds)
 
 
+def _are_minor(engine, best, missing, named):
+    """Whether causes without a name take little beside each named one of a set that leaves nothing
+    that stands out: what they stand for is no reason to doubt the others."""
+    if engine.left(best).share > 0 or engine.structure(best):
+        return False
+    least = min(engine.takes(best, cause) for cause in named)
+    return all(engine.takes(best, cause)
+               < (_MINOR_FILTER if is_link(best.effects[cause]) else _MINOR) * least
+               for cause in missing)
+
+
 def _refitted(engine, best, named, tied):
     """The causes that are named, fitted without the others; their uncertainties; and, in words,
     those that are no longer to be named then.
 
     What is not named is not in the model. Where the others are only `tied` with rivals (sets by
     cause) in which the named ones are the same, these stay as they are: with neither, they would
-    be bent.
+    be bent. What is minor beside them stays in the model where all is said with it.
     """
     base, named, dropped = engine.search.base.keys(), named & best.effects.keys(), {}
     fitted = best
@@ -477,6 +491,8 @@ def _refitted(engine, best, named, tied):
             for cause in missing):
         kept = {c: e for c, e in best.effects.items() if c not in missing}
         return engine.problem.fit(kept, held=kept), stds, {}
+    if named and missing and _are_minor(engine, best, missing, named):
+        return best, stds, {}
     while True:
         if named | constant != fitted.causes - base:
             fitted = engine.search.to_its_best(engine.search.fit(

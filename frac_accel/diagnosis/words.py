@@ -78,7 +78,7 @@ def description_words(described, unnamed, kept, left):
         words = f"; the extended model has {' and '.join(described)}, which describes a part of " \
                 "it and names nothing"
     if unnamed:
-        words += f"; the extended model keeps {' and '.join(unnamed)} as identified, without a name"
+        words += f"; the extended model keeps {' and '.join(unnamed)} without a name"
     if kept:
         words += f"; the extended model keeps {' and '.join(kept)}, which describe a part of it " \
                  f"and are not named: {_percent(left)} of the output is left with them"
