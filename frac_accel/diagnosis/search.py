@@ -290,7 +290,19 @@ class Search:
                 break
             half = getattr(effects[cause], start.parameter) / 2
             effects[cause] = dataclasses.replace(effects[cause], **{start.parameter: half})
-        return effects
+        return self._centred(effects)
+
+    def _centred(self, effects):
+        """Effects with their constant moved where it must be, if that is farther than a step of a
+        fit: what joins a fit may take gravity away, or give it back."""
+        p, cause = self.problem, IDENTIFIED["offset"].cause
+        if cause not in effects or any(map(acts_on_spring, effects.values())):
+            return effects
+        away = float(np.mean((p.measured - p.simulate(effects))[p.used]))
+        if not abs(away) > p.scales.level:
+            return effects
+        constant = effects[cause]
+        return {**effects, cause: dataclasses.replace(constant, offset=constant.offset + away)}
 
     def _later(self, effects, lag_s):
         """The delay among some linear effects, by so much later; none where there is none."""
