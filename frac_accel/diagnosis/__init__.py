@@ -48,6 +48,9 @@ _EDGE = 4
 # what is left the right way round that may be left then, for the pair to count as exchanged.
 _ALIKE = 0.5
 _EXCHANGED = 0.3
+# Share of its power in which a sensor must follow the reference at some frequencies or other, for
+# causes to be looked for where no classical sensor can be identified.
+_FOLLOWS = 0.5
 # Causes that are tried before a pair counts as exchanged.
 _TRIED = 4
 # Parameters of a classical core.
@@ -295,8 +298,14 @@ def _classical(record, axis, used, limit):
     from ..identification import identify
     # all that is found here is fitted anew
     record, used = strongest_part(record, AXES.index(axis), used, MOST)
-    model = identify(dataclasses.replace(record, valid=used), axis, "classical").model
     stds = dict.fromkeys(_CORE, np.inf)
+    try:
+        model = identify(dataclasses.replace(record, valid=used), axis, "classical").model
+    except IdentificationError:
+        gain = _gain_of_related(record, AXES.index(axis), used)
+        if gain is None:
+            raise
+        return SensorModel(Gain(gain)), stds, {}, None
     core, seed = SensorModel(model.core), {effect.cause: effect for effect in model.effects}
 
     def opened(model):
@@ -306,6 +315,19 @@ def _classical(record, axis, used, limit):
     if isinstance(core.core, Oscillator):
         core, seed, rival = flat_instead(record, AXES.index(axis), used, core, opened, seed, limit)
     return core, stds, seed, rival
+
+
+def _gain_of_related(record, column, used):
+    """Gain of fast motion where a sensor follows the reference through some filter, such as one
+    that takes most of the motion away, though no classical sensor does; else None."""
+    measured, reference = record.sensor[:, column], record.reference[:, column]
+    follows, share = related(measured, reference, used)
+    if not follows or share < _FOLLOWS:
+        return None
+    both = used[1:] & used[:-1]
+    moved, wanted = (np.diff(values)[both] for values in (reference, measured))
+    gain = float(moved @ wanted / max(moved @ moved, 1e-300))
+    return gain if gain else None
 
 
 def _stated_noise(samples, column):
