@@ -294,20 +294,24 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     verdict = verdict_of(
         findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
         fraction, account.accounted, strange or account.faulty)
-    described, kept, after = {}, {}, account.after
+    described, kept, after, output = {}, {}, account.after, None
     if verdict in _INCOMPLETE or strange:
-        described, after = _described(engine, fitted, after, {part for _, part in strange})
-        kept, after = _kept(engine, fitted, widest, after)
+        described, after, output = _described(engine, fitted, after, {part for _, part in strange})
+        kept, after, output = _kept(engine, fitted, widest, after, output)
     named = {f.cause: f.effect for f in findings}
     effects, late = _of_reference(engine, {**fitted.effects, **named, **(kept or {
         effect.cause: effect for effect in described})}, named)
     model = _extended(engine, effects, _stated(engine.problem, fitted, after / account.spread))
     p, spread = engine.problem, account.spread
     floor = _noise_floor(left, noise, account)
-    if verdict != "consistent" and floor < left.noise_rms:
+    if verdict == "consistent":
+        fraction = 0.0  # nothing asks for an explanation
+    elif floor < left.noise_rms:
         fraction = _remaining(engine, fitted, floor)
     # a model that has the limits leaves nothing there
     at_limit = engine.at_limit if any(f.effect.read_off for f in findings) else None
+    rest = engine.budget(fitted, at_limit) if output is None else \
+        engine.budget_between(p.measured, output, p.record.valid)
     if p.in_own_core:
         model, findings = in_own_core(model, findings, p.in_own_core, AXES[p.axis])
     return Diagnosis(
@@ -326,7 +330,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         Evidence.of(engine, best, fitted, named),
         noise.as_dict(), p.limit.summary(),
         [*engine.budget(engine.search.baseline).as_list("baseline"),
-         *engine.budget(fitted, at_limit).as_list("extended")])
+         *rest.as_list("extended")])
 
 
 def _stated(problem, fitted, nrmse):
@@ -514,7 +518,8 @@ def _refitted(engine, best, named, tied):
 
 
 def _described(engine, fitted, after, parts):
-    """What stands for what no cause explains, with words, and the held-out error.
+    """What stands for what no cause explains, with words, the held-out error, and the output with
+    it (None without).
 
     A fitted filter where a part of it is linear, and a fitted curve where one is even or odd.
     """
@@ -537,26 +542,27 @@ def _described(engine, fitted, after, parts):
         if found.is_worth_it and error < after:
             effects, output, after = more, simulated, error
             described[found.effect] = words
-    return described, after
+    return described, after, output if described else None
 
 
-def _kept(engine, fitted, widest, after):
+def _kept(engine, fitted, widest, after, output):
     """Effects of a set with linear causes that are only suspected, where it predicts held-out data
-    clearly better than all else that describes them, and the held-out error; or none."""
+    clearly better than all else that describes them, its held-out error and its output; or none,
+    and those given."""
     p, rest = engine.problem, engine.held_out_rows
     more = {cause: effect for cause, effect in widest.effects.items()
             if cause not in fitted.causes and (is_link(effect) or effect.pure_delay_s()
                                                or effect.is_constant or effect.restates_core)}
     if not more or p.limit.ends_judging("what is only suspected was not kept as a description"):
-        return {}, after
+        return {}, after, output
     wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
     errors = [(p.measured - engine.learnt(fit).output)[rest] for fit in (fitted, wider)]
     error = _rms(p.measured - wider.output, rest)
     better = gain(*errors)
     if not better.is_relevant or engine.hollow(wider) \
             or max(error, _rms(errors[1], slice(None))) > _CLEARLY * after:
-        return {}, after
-    return wider.effects, error
+        return {}, after, output
+    return wider.effects, error, wider.output
 
 
 def _of_reference(engine, effects, named):
