@@ -567,9 +567,9 @@ class Engine:
         """The best that is known of a set without a cause: a trial that was left, since it could
         not win, may lie above what fewer causes do."""
         less = self.search.without(best, cause)
-        return min((fit for fit in self.search.fits.values()
-                    if fit.causes <= less.causes and not fit.rough),
-                   key=lambda fit: (fit.cost, fit.causes != less.causes), default=less)
+        return min([less, *(fit for fit in self.search.fits.values()
+                            if fit.causes < less.causes and not fit.rough)],
+                   key=lambda fit: fit.cost)
 
     def odd_share(self, best, cause):
         """Share of the power that a cause adds which turns its sign with the motion."""

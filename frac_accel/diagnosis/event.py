@@ -16,7 +16,7 @@ _HOLDS, _OF_MOTION = 0.5, 0.2
 _ONE_SIDED = 0.3
 # Logarithm of what is left of a free motion where the start of a record ends, that start's share of
 # the record at most, and times what is left later (RMS) that must be left in it.
-_FORGOTTEN, _AT_MOST, _UNKNOWN = 9.0, 1 / 16, 3.0
+_FORGOTTEN, _AT_MOST, _UNKNOWN = 9.0, 0.0625, 3.0
 
 
 def event(residual, motion, used):
