@@ -24,7 +24,7 @@ from ..record.sources import pair_of
 from ..shown import several
 from ..simulation import AxisSimulator
 from .engine import Engine
-from .event import event
+from .event import event, start
 from .finding import Diagnosis, Finding, insufficient
 from .flat import flat_instead, with_rival
 from .judgement import judge
@@ -155,6 +155,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     _require_relation(engine, axis, seed)
     best = engine.run(seed)
     if engine.part is None:
+        engine, best = _without_start(begin, engine, best, found)
         engine, best = _without_drowned(begin, engine, best, found, seed)
     stages.enter("judging what was found", JUDGED)
     judged = with_rival(judge(engine, best, found, shown, noise_std), rival)
@@ -254,12 +255,33 @@ def _without_drowned(begin, engine, best, found, seed):
         hidden = event(best.residual, engine.problem.measured, engine.problem.used)
     if not hidden.any():
         return engine, best
-    other = begin(used=engine.wanted & ~hidden)
+    other = _beside(begin, engine, hidden)
     # what the record shows by itself is looked at once more
     other.spikes, other.aside = engine.spikes | shown, engine.aside & ~hidden
-    other.drowned, other.at_limit = hidden, engine.at_limit
-    other.identified, other.found = engine.identified, engine.found
+    other.drowned = hidden
     return other, other.run(seed)
+
+
+def _without_start(begin, engine, best, found):
+    """Engine whose fits leave out how a strong force's motion begins, and its best set; those given
+    where nothing stands out there."""
+    early = start(engine, best)
+    if not early.any():
+        return engine, best
+    found.words.append(f"the first {early.sum() / engine.problem.rate:.2g} s count in no fit: how "
+                       "the mass moved before is not known, and with the forces that are found it "
+                       "is not forgotten sooner")
+    other = _beside(begin, engine, early)
+    other.spikes, other.aside = engine.spikes, engine.aside
+    return other, other.run({cause: effect for cause, effect in best.effects.items()
+                             if cause not in engine.search.base})
+
+
+def _beside(begin, engine, hidden):
+    """The same engine without some samples that count."""
+    other = begin(used=engine.wanted & ~hidden)
+    other.at_limit, other.identified, other.found = engine.at_limit, engine.identified, engine.found
+    return other
 
 
 def _shown(found, record, column, used):

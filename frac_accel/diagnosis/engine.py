@@ -500,7 +500,7 @@ class Engine:
         On a coarse lattice the simulated values are put on it too: what rounding does to small
         signals is no other cause's merit.
         """
-        errors, step, less = [], self.coarse_step(best), self.search.without(best, cause)
+        errors, step, less = [], self.coarse_step(best), self._less(best, cause)
         known = self._unmoved(best)
         if known:
             less = self.problem.fit({**less.effects, **{name: best.effects[name]
@@ -560,8 +560,16 @@ class Engine:
 
     def takes(self, best, cause):
         """RMS that a fit of all samples leaves less with a cause than without it."""
-        less = self.search.without(best, cause)
+        less = self._less(best, cause)
         return float(np.sqrt(max(less.cost - best.cost, 0.0) / self.problem.count))
+
+    def _less(self, best, cause):
+        """The best that is known of a set without a cause: a trial that was left, since it could
+        not win, may lie above what fewer causes do."""
+        less = self.search.without(best, cause)
+        return min([less, *(fit for fit in self.search.fits.values()
+                            if fit.causes < less.causes and not fit.rough)],
+                   key=lambda fit: fit.cost)
 
     def odd_share(self, best, cause):
         """Share of the power that a cause adds which turns its sign with the motion."""

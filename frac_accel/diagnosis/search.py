@@ -1,12 +1,16 @@
 """Competing causes: which smallest set describes the record."""
 
 import dataclasses
+import functools
 
 import numpy as np
 
 from ..errors import FracAccelError
+from ..model import is_link
+from ..model.core import Oscillator
 from ..model.effects import IDENTIFIED, known_effects
-from ..model.parameters import fixed_values
+from ..model.effects.fit_starts import EquationOfMotion
+from ..model.parameters import fixed_values, parameter_fields
 from .problem import acts_on_spring, follows_path
 from .stages import SEARCHED, Stages
 
@@ -64,6 +68,17 @@ class View:
     excited: dict
     axis: str
     mixing: tuple = None
+    # names of the core's parameters that the fit moves
+    open_core: frozenset = frozenset()
+    # whether the output is the mass's motion, but for a gain, a constant and a delay
+    is_motion: bool = False
+    gain: float = 1.0
+    offset: float = 0.0
+
+    @functools.cached_property
+    def equation(self):
+        """`EquationOfMotion` along the measured output."""
+        return EquationOfMotion(self)
 
 
 class Search:
@@ -237,7 +252,10 @@ class Search:
         p = self.problem
         model = p.axis_model(fitted.effects)
         celsius = p.record.temperature_c
-        delay = IDENTIFIED["delay_s"].cause
+        delay, offset = (IDENTIFIED[name].cause for name in ("delay_s", "offset"))
+        own = p.baseline.axis(p.axis).core
+        gains = [e.transfer_function(np.zeros(1, complex))[0].real for e in model.effects
+                 if e.is_constant]
         return View(p.rate, p.time, p.measured, fitted.simulated, fitted.residual, p.used,
                     model.effective_core, p.record.since_start_s,
                     sum(e.delay_s for e in model.effects if e.cause == delay),
@@ -245,7 +263,22 @@ class Search:
                     celsius is not None and np.ptp(celsius) > 0.1,
                     p.excited,
                     "xyz"[p.axis],
-                    p.mixing)
+                    p.mixing,
+                    self._open_core(fitted, own),
+                    isinstance(own, Oscillator) and not any(
+                        acts_on_spring(e) or follows_path(e) or (is_link(e) and not e.is_constant)
+                        for e in model.effects),
+                    float(np.prod(gains)),
+                    sum(e.offset for e in model.effects if e.cause == offset))
+
+    @staticmethod
+    def _open_core(fitted, own):
+        """Names of the parameters of a core that the effects which a fit moves may restate."""
+        free = [fitted.effects[cause] for cause in {unknown.cause for unknown in fitted.unknowns}
+                if fitted.effects[cause].restates_core]
+        return frozenset(
+            field.name for field in parameter_fields(type(own)) for effect in free
+            if effect.restating(_other(own, field.name), own) != effect.restating(own, own))
 
     def screen(self, fitted):
         """List of (cost to be expected, cause, effect to begin with), best start of each cause."""
@@ -284,7 +317,7 @@ class Search:
     def begun(self, fitted, cause, begin):
         """Effects to begin with where a cause of `screen` joins a fit."""
         start = self._starts[fitted.causes, cause]
-        effects = {**fitted.effects, **self._later(fitted.effects, start.lag_s), cause: begin}
+        effects = self._joined(fitted.effects, start, begin)
         for _ in range(_HALVINGS if start.parameter else 0):
             if self.problem.cost(effects, rough=True) < _OVERSHOT * fitted.cost:
                 break
@@ -303,6 +336,15 @@ class Search:
             return effects
         constant = effects[cause]
         return {**effects, cause: dataclasses.replace(constant, offset=constant.offset + away)}
+
+    def _joined(self, effects, start, begin):
+        """Some effects with that of a start, here `begin`, and what goes with it."""
+        effects = {**effects, **self._later(effects, start.lag_s)}
+        if start.core is not None:
+            own = self.problem.baseline.axis(self.problem.axis).core
+            effects = {name: effect.restating(start.core, own) if effect.restates_core else effect
+                       for name, effect in effects.items()}
+        return {**effects, begin.cause: begin}
 
     def _later(self, effects, lag_s):
         """The delay among some linear effects, by so much later; none where there is none."""
@@ -326,6 +368,9 @@ class Search:
     def _option(self, start, fitted, cause, known, rows, share):
         """(Cost to be expected, cause, effect to begin with) of one start, or None."""
         p, changes = self.problem, []
+        if start.kind == "whole":
+            cost = p.cost(self._joined(fitted.effects, start, start.effect), rough=True)
+            return (cost, cause, start.effect) if cost < fitted.cost else None
         slow = _orthonormal(p.own_motions(start.effect)[rows])
         own = _orthonormal(slow - known @ (known.T @ slow))
         known = np.hstack([known, own])
@@ -453,6 +498,11 @@ class Search:
             # a filter of another order has another delay
             found = self.varied(found)
         return found
+
+
+def _other(core, name):
+    """A core with another value of one parameter."""
+    return dataclasses.replace(core, **{name: 0.9 * getattr(core, name)})
 
 
 def _is_nonlinear(fitted):

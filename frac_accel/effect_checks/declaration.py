@@ -17,7 +17,7 @@ from ..model.parameters import Scales, as_mapping, build, is_varied, parameter_f
 from .draws import CORE, RATE, Broken, core_for, sensor_with, span, words
 
 _TABLE = Path(__file__).parents[2] / "docs" / "effects.md"
-_KINDS = ("free", "positive", "finite", "weak")
+_KINDS = ("free", "positive", "finite", "weak", "whole")
 _DRAWS = 5
 
 

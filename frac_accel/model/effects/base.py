@@ -174,6 +174,11 @@ class Effect:
         """The core that says what this says beside another one; where `restates_core`."""
         return self.change_core(core)
 
+    def restating(self, core, own):
+        """This effect where beside a model's `own` core it says what another one is; where
+        `restates_core`."""
+        return self
+
     @classmethod
     def of_turn(cls, rotation, beside=None):
         """The effect that says that the sensor lies turned, or None.

@@ -38,6 +38,10 @@ class CoreParameterShift(Effect):
                                    natural_frequency_hz=self.natural_frequency_hz,
                                    damping_ratio=self.damping_ratio)
 
+    def restating(self, core, own):
+        return dataclasses.replace(self, natural_frequency_hz=core.natural_frequency_hz,
+                                   damping_ratio=core.damping_ratio)
+
     @classmethod
     def starts(cls, view):
         frequency, ratio = view.core.natural_frequency_hz, view.core.damping_ratio

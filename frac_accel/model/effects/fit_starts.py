@@ -18,6 +18,13 @@ _SEGMENTS, _MOSTLY = 16, 0.5
 # Segments whose lags are to lie on a line over time, the largest growth of such a lag, and parts of
 # a sample that it is told to.
 _LINES, _FASTEST_DRIFT, _FINER = 16, 2e-3, 4
+# Share of the output that a fit leaves from which the motion may differ so much from the linear one
+# that a force is sought in the equation of motion; and share of that equation's error that it may
+# leave to be worth a simulation.
+_STRONG, _MOSTLY_FORCE = 0.1, 0.5
+# Shares of the Nyquist frequency between which the equation of motion is faded out, and factor by
+# which a motion is refined before its powers are taken, which fold otherwise.
+_FADED, _REFINED = (0.6, 0.95), 2
 # Samples that must count on either side of an instant at which something is to have changed.
 _SIDE = 32
 # Share of a record at either end in which a change cannot be told from one that was always there.
@@ -35,12 +42,15 @@ class Start(NamedTuple):
     kind : str
         ``free``: the output is nearly linear in `parameter`, of either sign; ``positive``: the
         same, but it cannot be negative; ``finite``: the effect counts as it is; ``weak``: as it is
-        or weaker.
+        or weaker; ``whole``: as it is, by a simulation and not to first order.
     parameter : str or None
         What a screened factor scales.
     lag_s : float
         What a delay that is there already has to take on [s], where there is one: before, it may
         have stood for that of this effect.
+    core : Oscillator or None
+        What the sensor's core is beside this effect, where a fit may move it: before, it may have
+        been bent by the lack of it.
     """
 
     effect: object
@@ -48,6 +58,7 @@ class Start(NamedTuple):
     kind: str
     parameter: str | None = None
     lag_s: float = 0.0
+    core: object = None
 
 
 def free(effect, parameter=None):
@@ -77,6 +88,123 @@ def of_orders(averages, orders, most):
     return [dataclasses.replace(averages, order=order,
                                 length_s=averages.length_s * math.sqrt(averages.order / order))
             for order in orders if 1 <= order <= most]
+
+
+class EquationOfMotion:
+    r"""A sensor's equation of motion along the measured output, as linear least squares.
+
+    It is explicit in the output q, so with
+
+    .. math:: q = S a - c_1 q' - c_2 q'' - \alpha q^k - b
+
+    the core and the coefficient of a force are found together, however strong that is: no
+    simulation is needed, and no core that is nearly right. The error of that equation is the
+    output's, filtered by the core's inverse; filtered by the response of the core that is known, it
+    counts nearly as that of the output does.
+
+    Parameters
+    ----------
+    view : diagnosis.search.View
+    """
+
+    def __init__(self, view):
+        from ...signals.convolution import Convolution
+        self._view = view
+        used, core = view.used, view.core
+        output, simulated = view.measured - view.offset, view.simulated - view.offset
+        self._output, filtered = output, Convolution(output, view.rate)
+        s = filtered.s
+        place = np.abs(s.imag) / (np.pi * view.rate)
+        faded = np.cos(np.pi / 2 * np.clip((place - _FADED[0]) / np.ptp(_FADED), 0, 1))**2
+        u = s / (2 * np.pi * core.natural_frequency_hz)
+        self._response = faded * core.transfer_function(s) / core.sensitivity
+        decays = [np.exp(pole * view.time) for pole in core.poles() if pole.imag >= 0]
+        # what the record's start and a constant force leave is free
+        free = [np.ones(len(output)), *(part for decay in decays
+                                        for part in (decay.real, decay.imag) if np.any(part))]
+        self._span = np.linalg.qr(np.array(free).T[used])[0]
+        driven, speed, acceleration, self._left = self._clear(
+            Convolution(simulated, view.rate).response(faded)[used],
+            *(-filtered.response(power * self._response)[used] for power in (u**core.damping_order,
+                                                                            u * u)),
+            filtered.response(self._response)[used])
+        self._own = np.array([1.0, 2 * core.damping_ratio, 1.0])
+        columns = np.stack([driven, speed, acceleration], axis=1)
+        self._open = np.array(["sensitivity" in view.open_core, *[
+            {"natural_frequency_hz", "damping_ratio"} <= view.open_core] * 2])
+        self._left = self._left - columns[:, ~self._open] @ self._own[~self._open]
+        self._columns = columns[:, self._open]
+
+    def _clear(self, *columns):
+        return [column - self._span @ (self._span.T @ column) for column in columns]
+
+    def with_power(self, power):
+        """The core, and the coefficient of a force by a power of the motion, beside it.
+
+        Returns
+        -------
+        tuple of Oscillator and float, or None
+            None where the force does not take most of the equation's error.
+        """
+        from ...signals.convolution import Convolution
+        view, core = self._view, self._view.core
+        force, = self._clear(-Convolution(_power(self._output, power), view.rate)
+                             .response(self._response)[view.used])
+        errors = []
+        for columns in (self._columns, np.c_[self._columns, force]):
+            scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+            found = np.linalg.lstsq(columns / scale, self._left, rcond=None)[0] / scale
+            errors.append(np.linalg.norm(self._left - columns @ found))
+        values = self._own.copy()
+        values[self._open] = found[:-1]
+        if not errors[1] < _MOSTLY_FORCE * errors[0] or not np.all(values > 0):
+            return None
+        gained, damping, inertia = values.tolist()
+        # with u = s / omega_0 the inertia is 1 where the frequency is right
+        slower = math.sqrt(inertia)
+        gain = gained * view.gain
+        return dataclasses.replace(
+            core, natural_frequency_hz=core.natural_frequency_hz / slower,
+            damping_ratio=damping / 2 / slower**core.damping_order,
+            sensitivity=gain * core.sensitivity), float(found[-1]) * gain**(power - 1)
+
+
+def _power(values, power):
+    """Power of a band-limited signal, without what folds."""
+    from scipy.fft import irfft, next_fast_len, rfft
+    n = len(values)
+    length = next_fast_len(n + n // 8, real=True)
+    before = (length - n) // 2
+    padded = np.pad(values, (before, length - n - before), mode="reflect", reflect_type="odd")
+    fine = irfft(rfft(padded), _REFINED * length) * _REFINED
+    return irfft(rfft(fine**power)[:length // 2 + 1], length)[before:before + n] / _REFINED
+
+
+def by_equation(view, cause, power):
+    """Start of a force by a power of the motion, as the equation of motion says it.
+
+    Parameters
+    ----------
+    view : diagnosis.search.View
+    cause : type of Effect
+        Its one parameter is the force's coefficient.
+    power : int
+
+    Returns
+    -------
+    list of Start
+        None where the motion is nearly linear, or such a force does not explain most of what is
+        left.
+    """
+    if not view.is_motion or np.std(view.residual[view.used]) \
+            < _STRONG * np.std(view.measured[view.used]):
+        return []
+    found = view.equation.with_power(power)
+    if found is None:
+        return []
+    core, coefficient = found
+    effect = cause(coefficient)
+    return [Start(effect, (effect,), "whole", core=core)]
 
 
 def bulk_shift(simulated, measured, used):

@@ -4,7 +4,7 @@ import dataclasses
 
 from ..parameters import parameter
 from .base import CORE, Effect, require_oscillator
-from .fit_starts import free
+from .fit_starts import by_equation, free
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,4 +27,4 @@ class QuadraticStiffness(Effect):
 
     @classmethod
     def starts(cls, view):
-        return [free(cls(1e-3 / view.level), "alpha2")]
+        return [free(cls(1e-3 / view.level), "alpha2"), *by_equation(view, cls, 2)]

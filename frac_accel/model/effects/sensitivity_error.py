@@ -34,6 +34,9 @@ class SensitivityError(Effect):
     def restated(self, core):
         return dataclasses.replace(core, sensitivity=core.sensitivity * self.gain)
 
+    def restating(self, core, own):
+        return dataclasses.replace(self, gain=core.sensitivity / own.sensitivity)
+
     def transfer_function(self, s):
         return np.full_like(s, self.gain, dtype=complex)
 
