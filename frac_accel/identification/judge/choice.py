@@ -99,7 +99,8 @@ def _flat_instead(candidates):
         classical = candidates["oscillator"]
         data, resonance = candidates.data, classical.fit["natural_frequency_hz"]
         std = classical.fit.std[classical.fit.names.index("natural_frequency_hz")]
-        highest = excited_band(data.reference, data.sensor, data.pair.sampling_rate_hz)[1]
+        highest = excited_band(data.reference, data.sensor, data.pair.sampling_rate_hz,
+                               data.response.excitation.kind == "sweep")[1]
         highest = min(highest, data.pair.band_hz or np.inf)
         # such a one may have integrated the motion to follow a zero that wanders
         nothing = classical.held_out_nrmse > 1
