@@ -20,8 +20,9 @@ _CLEARLY = 0.7
 # damping must take away, and the share of a residual that chance alone seems to explain.
 _TAKEN, _SEEMING = 0.5, 0.1
 # Least share of the classical held-out residual (RMS) that a fractional damping must take away to
-# matter, whatever its significance; where noise hides that, of the output.
-_MATTERS, _OF_OUTPUT = 0.01, 3e-3
+# matter, whatever its significance, with an order that near to 1 and further away; where noise hides
+# that, of the output.
+_MATTERS, _NEAR_ONE, _MATTERS_FAR, _OF_OUTPUT = 0.01, 0.1, 0.0025, 3e-3
 # Share of an order's distance from 1 by which both domains must differ to contradict each other.
 _OTHER_ORDER = 1 / 3
 # A resonance that far above the excited band, or known no better than this, is out of sight; of a
@@ -195,7 +196,7 @@ def _preferred(classical, fractional, datas, judged):
         return classical, f"a fractional damping is not significant: {score}"
     if not fractional.held_out_nrmse < classical.held_out_nrmse:
         return classical, f"a fractional damping does not predict better: {held_out}"
-    if not _matters(classical.held_out_nrmse, fractional.held_out_nrmse):
+    if not _matters(order, classical.held_out_nrmse, fractional.held_out_nrmse):
         return classical, f"a fractional damping does not predict clearly better: {held_out}"
     if fractional.held_out_nrmse > MOST_LEFT:
         return classical, f"a fractional damping leaves most of held-out data, too: {held_out}"
@@ -209,9 +210,10 @@ def _preferred(classical, fractional, datas, judged):
     return fractional, f"{score} differs from 1; {held_out}"
 
 
-def _matters(before, after):
+def _matters(order, before, after):
     """Whether a held-out residual that is smaller is so by more than nobody would miss."""
-    return after < (1 - _MATTERS) * before or before**2 - after**2 > _OF_OUTPUT**2
+    least = _MATTERS if abs(order - 1) < _NEAR_ONE else _MATTERS_FAR
+    return after < (1 - least) * before or before**2 - after**2 > _OF_OUTPUT**2
 
 
 def _contradicted(structure, fit, data):
