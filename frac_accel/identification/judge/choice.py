@@ -20,8 +20,8 @@ _CLEARLY = 0.7
 # damping must take away, and the share of a residual that chance alone seems to explain.
 _TAKEN, _SEEMING = 0.5, 0.1
 # Least share of the classical held-out residual (RMS) that a fractional damping must take away to
-# matter, whatever its significance, with an order that near to 1 and further away; where noise hides
-# that, of the output.
+# matter, whatever its significance, with an order that near to 1 and further away; of the output,
+# where noise hides that.
 _MATTERS, _NEAR_ONE, _MATTERS_FAR, _OF_OUTPUT = 0.01, 0.1, 0.0025, 3e-3
 # Share of an order's distance from 1 by which both domains must differ to contradict each other.
 _OTHER_ORDER = 1 / 3
