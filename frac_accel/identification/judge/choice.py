@@ -20,9 +20,9 @@ _CLEARLY = 0.7
 # damping must take away, and the share of a residual that chance alone seems to explain.
 _TAKEN, _SEEMING = 0.5, 0.1
 # Least share of the classical held-out residual (RMS) that a fractional damping must take away to
-# matter, whatever its significance, with an order that near to 1 and further away; of the output,
-# where noise hides that.
-_MATTERS, _NEAR_ONE, _MATTERS_FAR, _OF_OUTPUT = 0.01, 0.1, 0.0025, 3e-3
+# matter, whatever its significance, with an order that near to 1; of the output, where noise hides
+# that.
+_MATTERS, _NEAR_ONE, _OF_OUTPUT = 0.01, 0.1, 3e-3
 # Share of an order's distance from 1 by which both domains must differ to contradict each other.
 _OTHER_ORDER = 1 / 3
 # A resonance that far above the excited band, or known no better than this, is out of sight; of a
@@ -212,8 +212,8 @@ def _preferred(classical, fractional, datas, judged):
 
 def _matters(order, before, after):
     """Whether a held-out residual that is smaller is so by more than nobody would miss."""
-    least = _MATTERS if abs(order - 1) < _NEAR_ONE else _MATTERS_FAR
-    return after < (1 - least) * before or before**2 - after**2 > _OF_OUTPUT**2
+    return (abs(order - 1) >= _NEAR_ONE or after < (1 - _MATTERS) * before
+            or before**2 - after**2 > _OF_OUTPUT**2)
 
 
 def _contradicted(structure, fit, data):
