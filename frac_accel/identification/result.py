@@ -121,7 +121,8 @@ class Identification(Shown):
                 "held_out_nrmse": _number(data["held_out_nrmse"]),
                 "validation": FitValidation.from_dict(data["validation"]),
                 "evidence": Evidence.from_dict(data["evidence"]),
-                "excitation": rebuilt(Excitation, data["excitation"]),
+                "excitation": rebuilt(Excitation, {  # older ones have one band
+                    "excited_hz": data["excitation"]["band_hz"], **data["excitation"]}),
                 "points": data["points"] and ResponsePoints.from_dict(data["points"]),
                 "frequency_domain": compared and {
                     **compared, "parameters": _quantities(compared["parameters"])}})

@@ -99,11 +99,12 @@ def _parameters(section, result):
 
 def _excitation(section, excited, seen):
     samples, rate = seen.samples, seen.sampling_rate_hz
-    low, high = excited.band_hz
+    (first, last), (low, high) = excited.excited_hz, excited.band_hz
     section.text(sentence(excited.description)
                  + f" {samples} samples at {rate:.6g} Hz ({samples / rate:.4g} s). The "
-                 "reference has power, and the sensor answers to it, from "
-                 f"{low:.4g} Hz to {high:.4g} Hz; elsewhere the model is extrapolated.")
+                 f"reference has power from {first:.4g} Hz to {last:.4g} Hz, and the sensor "
+                 f"answers to it from {low:.4g} Hz to {high:.4g} Hz; elsewhere the model is "
+                 "extrapolated.")
     rows = [["order of persistent excitation", str(excited.order), f"{excited.needed} needed"],
             ["RMS", f"{excited.rms:.4g}", "m/s²"],
             ["RMS of the quietest twentieth", f"{excited.quietest_rms:.4g}", "m/s²"],

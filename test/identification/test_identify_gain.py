@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import shaken
 from exact_sines import oscillator, record, samples
 
 from frac_accel import diagnose, identify
@@ -51,3 +52,32 @@ def test_a_diagnosis_without_a_model_begins_with_the_gain():
     assert [finding.cause for finding in found.findings] == ["time_delay"]
     assert found.findings[0].effect.delay_s == pytest.approx(3e-3, abs=1e-5)
     assert isinstance(found.model.core, Gain)
+
+
+def test_a_low_pass_without_a_phase_is_no_resonance():
+    """As loggers have it before they thin out; with the noise of a phone in a car."""
+    found = identify(pair_of(7, lambda s: 1 / np.sqrt(1 + (np.abs(s) / (2 * np.pi * 400))**24),
+                             band=(5.0, 410.0), noise=0.08), "x", "classical")
+    assert isinstance(found.model.core, Gain)
+
+
+def test_a_damped_resonance_just_beyond_the_band_stays_one():
+    """Which has its delay, though a clock takes a tenth of it back."""
+    found = identify(pair_of(8, lambda s: oscillator(s, 450.0, 0.6) * np.exp(4e-5 * s),
+                             band=(5.0, 410.0)), "x", "classical")
+    assert found.parameters["natural_frequency_hz"]["value"] == pytest.approx(450, rel=1e-2)
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_lightly_damped_resonance_above_a_sweep_is_one(seed):
+    """Noise of the reference, which it amplifies, looks like a lead of a hundredth of a sample."""
+    rng = np.random.default_rng([50272, seed])
+    rate, frequency_hz = 50_000.0, rng.uniform(17_000, 21_000)
+    motion = shaken.sweep(rate, 24_000, 30.0, 15_000.0)
+    pair = shaken.measured(rng, motion, rate, frequency_hz, 0.02, rng.uniform(50, 60),
+                           rng.uniform(60, 75))
+    found = identify(pair, sampling_rate_hz=rate)
+    assert found.structure == "oscillator"
+    assert found.parameters["natural_frequency_hz"]["value"] == pytest.approx(frequency_hz,
+                                                                              rel=2e-3)
+    assert found.held_out_nrmse < 0.01

@@ -9,7 +9,11 @@ from scipy.stats import binom
 from frac_accel import FracAccelError, identify
 from frac_accel.identification.fit.output_error import fit_output_error
 from frac_accel.identification.fit.structures import OscillatorStructure
-from frac_accel.identification.judge.fit_validation import judge_residual
+from frac_accel.identification.judge.fit_validation import (
+    BandFit,
+    fit_validation,
+    judge_residual,
+)
 from frac_accel.identification.judge.residual_tests import residual_tests
 from frac_accel.io.samples import Samples
 from frac_accel.record import Record
@@ -133,3 +137,22 @@ def test_held_out_residual_by_octaves_is_the_noise():
 def test_too_little_to_test_is_said(residual, reference, words):
     with pytest.raises(FracAccelError, match=words):
         residual_tests(residual, reference)
+
+
+@pytest.mark.parametrize("floor, words", [
+    (0.3283, "30.84% of the output there, all of which no linear model explains"),
+    (0.1, "30.84% of the output there, of which 10.00% no linear model explains"),
+    (np.nan, "30.84% of the output there")])
+def test_no_part_of_an_octave_is_said_to_be_larger_than_the_whole(floor, words):
+    """The floor is estimated by coherence, the whole by a spectrum of its own."""
+    assert fit_validation(None, 0.1, [BandFit((5.0, 10.0), 0.3084, floor)]).verdict[0].endswith(
+        words)
+
+
+def test_a_dependence_too_small_to_show_is_said_to_be_small():
+    rng = np.random.default_rng(50269)
+    reference, noise = rng.standard_normal((2, 20_000))
+    tests = residual_tests(0.1 * np.roll(reference, 3) + noise, reference)
+    assert not tests.independent
+    assert "a further 1." in fit_validation(tests, 0.1, []).verdict[0]
+    assert "a further less than 0.01% of" in fit_validation(tests, 1e-5, []).verdict[0]

@@ -19,12 +19,22 @@ _CLEARLY = 0.7
 # Share of what a linear model could still explain of the classical residual that a fractional
 # damping must take away, and the share of a residual that chance alone seems to explain.
 _TAKEN, _SEEMING = 0.5, 0.1
+# Least share of the classical held-out residual (RMS) that a fractional damping must take away to
+# matter, whatever its significance, with an order that near to 1; of the output, where noise hides
+# that.
+_MATTERS, _NEAR_ONE, _OF_OUTPUT = 0.01, 0.1, 3e-3
+# Share of an order's distance from 1 by which both domains must differ to contradict each other.
+_OTHER_ORDER = 1 / 3
 # A resonance that far above the excited band, or known no better than this, is out of sight; of a
 # gain, the held-out residual over that with a resonance with which the gain will do.
 _IN_SIGHT, _UNDETERMINED, _NO_BETTER = 1.5, 0.2, 1.05
 # Share of an oscillator's own delay that a lead must take back to stand for a smoothed reference;
-# less is a clock's.
-_TAKEN_BACK = 0.1
+# less is a clock's. Damping ratio below which the delay counts as if it were that: what smoothes a
+# reference so that it feigns a peak leads by as much.
+_TAKEN_BACK, _LEAST_DAMPED = 0.1, 0.5
+# Damping ratio from which on a resonance just beyond the band shows no peak in it, and share of its
+# delay without which it is the low-pass without a phase that comes before samples are thinned out.
+_PEAKLESS, _ALL_TAKEN_BACK = 0.5, 0.5
 # Time constants after which a motion from before the record counts no more, and samples at both
 # ends that the band-limited simulation cannot know.
 _SETTLING = 7.0
@@ -55,11 +65,15 @@ def choose(data):
         arx = Candidate.of("arx", data)
     except IdentificationError:
         return chosen, reason
+    others = "a gain" if flat else "an oscillator with classical or fractional damping"
+    rival = candidates["oscillator"].held_out_nrmse
+    if flat and rival < best:
+        # not believed, but what names nothing must do better than its three parameters
+        others, best = "a gain or an oscillator", rival
     held_out = f"held-out residual {arx.held_out_nrmse:.3%} against {best:.3%}"
     if not arx.held_out_nrmse < _CLEARLY * best:
         return chosen, (f"{reason}; a free transfer function in z does not predict clearly better: "
                         f"{held_out}")
-    others = "a gain" if flat else "an oscillator with classical or fractional damping"
     return arx, (f"it predicts clearly better than {others}: {held_out}; something else acts, "
                  "which its coefficients cannot name")
 
@@ -86,23 +100,26 @@ def _flat_instead(candidates):
         classical = candidates["oscillator"]
         data, resonance = candidates.data, classical.fit["natural_frequency_hz"]
         std = classical.fit.std[classical.fit.names.index("natural_frequency_hz")]
-        highest = excited_band(data.reference, data.sensor, data.pair.sampling_rate_hz)[1]
+        highest = excited_band(data.reference, data.sensor, data.pair.sampling_rate_hz,
+                               data.response.excitation.kind == "sweep")[1]
+        highest = min(highest, data.pair.band_hz or np.inf)
         # such a one may have integrated the motion to follow a zero that wanders
         nothing = classical.held_out_nrmse > 1
-        if resonance < _IN_SIGHT * highest and std < _UNDETERMINED * resonance and not nothing:
+        in_sight = (resonance < _IN_SIGHT * highest and std < _UNDETERMINED * resonance
+                    and not nothing)
+        if in_sight and not _without_its_delay(classical.fit, highest):
             return None
         flat = candidates["gain"]
     except IdentificationError:
         if nothing:
             raise
         return None
-    delay, delay_std = (values[classical.fit.names.index("delay_s")]
-                        for values in (classical.fit.values, classical.fit.std))
+    lead, share = _lead(classical.fit)
     if flat.held_out_nrmse <= _NO_BETTER * classical.held_out_nrmse:
         why = "does not predict clearly better than a gain"
-    elif -delay > max(SIGNIFICANT * delay_std,
-                      _TAKEN_BACK * classical.fit["damping_ratio"] / (np.pi * resonance)):
-        why = (f"would answer {-delay:.3g} s before the reference moves, as if that were smoothed; "
+    elif share > _TAKEN_BACK and (
+            not in_sight or classical.held_out_nrmse > _CLEARLY * flat.held_out_nrmse):
+        why = (f"would answer {lead:.3g} s before the reference moves, as if that were smoothed; "
                "its parameters are open, and a gain is all that can be said")
     else:
         return None
@@ -110,6 +127,25 @@ def _flat_instead(candidates):
     return flat, (f"no resonance shows up to {highest:.4g} Hz: an oscillator {place} {why} "
                   f"(held-out residual "
                   f"{classical.held_out_nrmse:.3%} against {flat.held_out_nrmse:.3%})")
+
+
+def _lead(fit):
+    """Significant lead of an oscillator [s], and its share of the oscillator's own delay; or 0."""
+    place = fit.names.index("delay_s")
+    lead = -fit.values[place]
+    if not lead > SIGNIFICANT * fit.std[place]:
+        return 0.0, 0.0
+    own = max(fit["damping_ratio"], _LEAST_DAMPED) / (np.pi * fit["natural_frequency_hz"])
+    return lead, lead / own
+
+
+def _without_its_delay(fit, highest):
+    """Whether an oscillator has its resonance beyond the band, no peak, and hardly its delay left.
+
+    A low-pass without a phase does that, as loggers have it before they thin out samples.
+    """
+    return (fit["natural_frequency_hz"] > highest and fit["damping_ratio"] > _PEAKLESS
+            and _lead(fit)[1] > _ALL_TAKEN_BACK)
 
 
 def choose_of_several(structure, datas, records):
@@ -160,12 +196,42 @@ def _preferred(classical, fractional, datas, judged):
         return classical, f"a fractional damping is not significant: {score}"
     if not fractional.held_out_nrmse < classical.held_out_nrmse:
         return classical, f"a fractional damping does not predict better: {held_out}"
+    if not _matters(order, classical.held_out_nrmse, fractional.held_out_nrmse):
+        return classical, f"a fractional damping does not predict clearly better: {held_out}"
     if fractional.held_out_nrmse > MOST_LEFT:
         return classical, f"a fractional damping leaves most of held-out data, too: {held_out}"
     if not _explains(classical, fractional, datas):
         return classical, ("a fractional damping does not explain what the classical model lacks: "
                            f"{held_out}")
+    for fit, data in zip(fractional.fits, datas):
+        contradicted = _contradicted(fractional.structure, fit, data)
+        if contradicted:
+            return classical, contradicted
     return fractional, f"{score} differs from 1; {held_out}"
+
+
+def _matters(order, before, after):
+    """Whether a held-out residual that is smaller is so by more than nobody would miss."""
+    return (abs(order - 1) >= _NEAR_ONE or after < (1 - _MATTERS) * before
+            or before**2 - after**2 > _OF_OUTPUT**2)
+
+
+def _contradicted(structure, fit, data):
+    """What the points of the frequency response say against a damping order, in words; or None.
+
+    Noise of the reference, which a resonance amplifies, bends a fit in the time domain; the points
+    are averages, in which most of it is gone.
+    """
+    compared, _ = data.response.compared(structure, fit)
+    if compared is None:
+        return None
+    value, std = (compared["parameters"]["damping_order"][key] for key in ("value", "std"))
+    own, own_std = fit["damping_order"], fit.std[fit.names.index("damping_order")]
+    apart = abs(value - own)
+    if apart <= max(SIGNIFICANT * np.hypot(std, own_std), _OTHER_ORDER * abs(own - 1)):
+        return None
+    return (f"the frequency response contradicts a fractional damping: order {own:.4g} ± "
+            f"{own_std:.2g} in the time domain, {value:.4g} ± {std:.2g} in the frequency domain")
 
 
 def _explains(classical, fractional, datas):

@@ -17,6 +17,8 @@ from .residual_tests import ResidualTests, p_words, residual_tests
 # Held-out residual over the noise floor, and over the output, above which an octave lacks more.
 _ABOVE_FLOOR = 2.0
 _WORTH_SAYING = 1e-3
+# Least share of the output that the sentences show.
+_SHOWN = 1e-4
 # Segments of the coherence, and the share of them that Hann windows overlapping by half leave
 # independent (P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70-73).
 _SEGMENTS = 16
@@ -192,9 +194,11 @@ def _tapered(count):
 
 def _residual_words(tests, nrmse):
     if not tests.independent:
+        further = tests.dependent_share * nrmse
+        share = f"{further:.2%}" if further >= _SHOWN else f"less than {_SHOWN:.2%}"
         return ["the residual depends on the reference "
                 f"({p_words(tests.independence_p_value)}): a better model could explain a further "
-                f"{tests.dependent_share * nrmse:.2%} of the output"]
+                f"{share} of the output"]
     words = ["the residual does not depend linearly on the reference "
              f"({p_words(tests.independence_p_value)})"]
     if tests.white:
@@ -213,6 +217,9 @@ def _band_words(bands):
     low, high = worst.band_hz
     words = (f"held-out data are predicted worst from {low:.4g} to {high:.4g} Hz: "
              f"{worst.nrmse:.2%} of the output there")
-    if np.isfinite(worst.floor):
+    if worst.floor >= worst.nrmse:
+        # estimated apart, by coherence: it may come out larger than the whole
+        words += ", all of which no linear model explains"
+    elif np.isfinite(worst.floor):
         words += f", of which {worst.floor:.2%} no linear model explains"
     return [words]

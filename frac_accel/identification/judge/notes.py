@@ -67,6 +67,6 @@ def _seismic_notes(parameters, chosen, highest):
         return notes
     resonance = parameters["natural_frequency_hz"]["value"]
     if highest < resonance / 3:
-        notes.append(f"the excitation ends at {highest:.4g} Hz, far below the resonance at "
-                     f"{resonance:.4g} Hz; the model holds only up to there")
+        notes.append(f"the sensor follows the reference up to {highest:.4g} Hz, far below the "
+                     f"resonance at {resonance:.4g} Hz; the model holds only up to there")
     return notes

@@ -3,6 +3,8 @@
 import dataclasses
 
 import numpy as np
+from scipy.fft import rfft
+from scipy.ndimage import uniform_filter1d
 
 from ...errors import IdentificationError
 from ...signals.averaged_spectra import coherence_of, power_of, segment_spectra
@@ -19,8 +21,11 @@ _LEARN, _QUIET_END, _STRETCHES = 0.6, 0.5, 20
 # from which the record is a sweep; stretches of it, and samples that each and a spectrum's segment
 # have.
 _HARDLY, _MUCH_NEW, _OF_SWEEP, _SHORTEST, _SEGMENT = 0.1, 0.2, 100, 64, 1024
-# Share of the sensor's power that must come from the reference.
-_COHERENT = 0.8
+# Share of the sensor's power that must come from the reference, and that in few long segments,
+# where chance has more of it; share of the excited band that counts as all of it.
+_COHERENT, _COHERENT_LONG, _NEARLY = 0.8, 0.9, 0.9
+# Lines to both sides over which the spectrum of the whole record is averaged.
+_SMEARED = 4
 # Frequencies worth exciting, as shares of the sampling rate: below the resonance, and as high as
 # delays and an anti-aliasing filter leave a sensor.
 _LOWEST, _HIGHEST = 0.01, 0.4
@@ -42,6 +47,9 @@ class Excitation:
     needed : int
         Parameters to be identified.
     band_hz : tuple of float
+        Where the sensor follows the reference (`excited_band`): the model's.
+    excited_hz : tuple of float
+        Where the reference has power.
     rms, peak : float
         Of the reference's motion, its mean taken off [m/s²].
     crest_factor : float
@@ -60,6 +68,7 @@ class Excitation:
     order: int
     needed: int
     band_hz: tuple
+    excited_hz: tuple
     rms: float
     peak: float
     crest_factor: float
@@ -82,47 +91,94 @@ class Excitation:
         levels = np.sqrt(energies[counts > 0] / counts[counts > 0]).tolist()
         rms = float(np.sqrt(energies.sum() / counts.sum()))
         peak = float(np.max(np.abs(motion)))
-        low, high = excited_band(reference, sensor, pair.sampling_rate_hz)
+        low, high = excited_band(reference, sensor, pair.sampling_rate_hz,
+                                 recognised.kind == "sweep")
+        excited = tuple(recognised.band_hz) or powerful_band(reference, pair.sampling_rate_hz)
         # above it nothing can be compared
         band = (low, min(high, pair.band_hz)) if pair.band_hz else (low, high)
-        return cls(recognised.kind, recognised.words, order, needed, band, rms, peak, peak / rms,
-                   min(levels), max(levels), pair.sensor_std, len(pair), record.missing,
-                   record.clipped, record.standing)
+        return cls(recognised.kind, recognised.words, order, needed, band, excited, rms, peak,
+                   peak / rms, min(levels), max(levels), pair.sensor_std, len(pair),
+                   record.missing, record.clipped, record.standing)
 
     @property
     def words(self):
         """Two lines for a user."""
-        low, high = self.band_hz
+        low, high = self.excited_hz
         left_out = [f"{count} {what}" for count, what in (
             (self.missing, "missing"), (self.clipped, "clipped"),
             (self.standing, "standing still")) if count]
         return (f"{self.description}; excited from {low:.4g} to {high:.4g} Hz, of order "
                 f"{self.order} (at least {self.needed} needed)"
+                f"{'; ' if self.followed else ''}{self.followed}"
                 f"{'; samples left out: ' if left_out else ''}{', '.join(left_out)}\n"
                 f"reference RMS {self.rms:.4g} m/s^2 ({self.quietest_rms:.3g} to "
                 f"{self.loudest_rms:.3g} along the record), peak {self.peak:.4g} m/s^2, crest "
                 f"factor {self.crest_factor:.3g}")
 
 
-def excited_band(reference, sensor, sampling_rate_hz):
+    @property
+    def followed(self):
+        """Where the sensor follows, in words; empty where that is all that is excited."""
+        (low, high), (first, last) = self.band_hz, self.excited_hz
+        if high > _NEARLY * last and low < max(2 * first, (1 - _NEARLY) * last):
+            return ""
+        return (f"the sensor follows the reference from {low:.4g} to {high:.4g} Hz only (coherence "
+                f"above {_COHERENT})")
+
+
+def powerful_band(reference, sampling_rate_hz):
+    """Lowest and highest frequency at which the reference has power [Hz].
+
+    With the resolution of the whole record; the lowest is 0 where that does not tell it from zero.
+    """
+    n = len(reference)
+    taper = np.hanning(n)
+    lines = np.abs(rfft((reference - reference @ taper / taper.sum()) * taper))**2
+    # the mean of neighbours, as single lines of noise may be small
+    power = uniform_filter1d(lines, 2 * _SMEARED + 1, mode="reflect")
+    strong = np.flatnonzero(power > _FLOOR * power.max())
+    if not len(strong):
+        return 0.0, 0.0
+    low = strong[0] + _SMEARED if strong[0] > 0 else 0
+    high = max(strong[-1] - _SMEARED, low) if strong[-1] < len(power) - 1 else strong[-1]
+    return float(low * sampling_rate_hz / n), float(high * sampling_rate_hz / n)
+
+
+def excited_band(reference, sensor, sampling_rate_hz, sweep=False):
     """Band in which the reference has power and the sensor answers to it.
 
     Parameters
     ----------
     reference, sensor : ndarray, shape (n,)
     sampling_rate_hz : float
+    sweep : bool
+        Whether each frequency comes once. The last ones come where the windows of long segments
+        have faded.
 
     Returns
     -------
     tuple of float
         Lowest and highest frequency [Hz] between which both hold for most frequencies.
     """
-    frequency, power = _spectrum(reference, sampling_rate_hz)
-    length = _segment(reference) // 4
-    shared = coherence_of(*(segment_spectra(values, "hann", length)
-                            for values in (reference, sensor)))
-    shared = np.interp(frequency, np.linspace(0, sampling_rate_hz / 2, len(shared)), shared)
-    strong = ((power > _FLOOR * power.max()) & (shared > _COHERENT)).astype(float)
+    low, high = _followed(reference, sensor, sampling_rate_hz, _segment(reference))
+    if sweep and len(reference) >= _OF_SWEEP * _SHORTEST:
+        high = max(high, _followed(reference, sensor, sampling_rate_hz,
+                                   len(reference) // (_OF_SWEEP // 4))[1])
+    return low, high
+
+
+def _followed(reference, sensor, sampling_rate_hz, segment):
+    """The same with segments of some length."""
+    frequency = np.fft.rfftfreq(segment, 1 / sampling_rate_hz)
+    power = power_of(segment_spectra(reference, "blackmanharris", segment))
+    # short segments average more; but the sensor may answer for longer than one lasts
+    agreeing = np.zeros(len(frequency), bool)
+    for length, least in ((segment // 4, _COHERENT), (segment, _COHERENT_LONG)):
+        shared = coherence_of(*(segment_spectra(values, "hann", length)
+                                for values in (reference, sensor)))
+        agreeing |= np.interp(frequency, np.linspace(0, sampling_rate_hz / 2, len(shared)),
+                              shared) > least
+    strong = ((power > _FLOOR * power.max()) & agreeing).astype(float)
     # where most of five neighbours are strong
     most = np.flatnonzero(np.convolve(strong, np.ones(5), "same") > 2)
     if not len(most):

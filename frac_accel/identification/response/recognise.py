@@ -21,6 +21,10 @@ _STEP = 1.2
 _PERIODIC = 0.8
 _DRIFT = 0.1
 _SHORTEST_PERIOD = 16
+# Blocks of a record in which a fast sweep's phase is a parabola, the fewest samples of one, and
+# amplitude of a block, of the largest, from which on it has a frequency; correlation with time from
+# which on that goes evenly, in Hz or in octaves.
+_CHIRPS, _OF_CHIRP, _LOUD, _EVEN = 128, 16, 0.1, 0.99
 # Bandwidth times duration of one event, and the share of the record that it lasts.
 _ONE_EVENT = 5.0
 _SHORT = 0.2
@@ -49,12 +53,15 @@ class Recognised:
         Period of a multisine; 0 for the others.
     tones : tuple of Tone
         Dwells of a stepped sine, or of the one sine.
+    band_hz : tuple of float
+        Lowest and highest frequency of sweeps and dwells; empty for the others.
     """
 
     kind: str
     words: str
     period_samples: int = 0
     tones: tuple = ()
+    band_hz: tuple = ()
 
 
 def recognise(reference, sampling_rate_hz):
@@ -80,19 +87,22 @@ def recognise(reference, sampling_rate_hz):
         tones = _joined(tones, sampling_rate_hz)
         frequencies = [tone.frequency_hz for tone in tones]
         if len(set(np.round(np.log(frequencies), 3))) == 1:
-            return Recognised("sine", f"sine at {frequencies[0]:.4g} Hz", tones=tuple(tones))
+            return Recognised("sine", f"sine at {frequencies[0]:.4g} Hz", tones=tuple(tones),
+                              band_hz=(frequencies[0], frequencies[0]))
         return Recognised("stepped_sine", f"stepped sine, {len(tones)} dwells from "
                           f"{min(frequencies):.4g} to {max(frequencies):.4g} Hz",
-                          tones=tuple(tones))
+                          tones=tuple(tones), band_hz=(min(frequencies), max(frequencies)))
     period = _period(moving)
     if period:
         return Recognised("multisine", f"multisine of {len(moving) / period:.3g} periods of "
                           f"{period / sampling_rate_hz:.4g} s", period)
-    if tonal and _swept(tones):
-        low, high = _band(moving, sampling_rate_hz)
-        if tones[0].frequency_hz > tones[-1].frequency_hz:
-            low, high = high, low
-        return Recognised("sweep", f"swept sine from {low:.3g} to {high:.3g} Hz")
+    passed = _passed(moving, sampling_rate_hz)
+    if passed is not None or tonal and _swept(tones):
+        words, first, last = passed or ("swept sine", *_band(moving, sampling_rate_hz))
+        if passed is None and tones[0].frequency_hz > tones[-1].frequency_hz:
+            first, last = last, first
+        return Recognised("sweep", f"{words} from {first:.3g} to {last:.3g} Hz",
+                          band_hz=(float(min(first, last)), float(max(first, last))))
     return Recognised("noise", "random noise or other broadband motion")
 
 
@@ -229,6 +239,44 @@ def _swept(tones):
     """Whether the frequency goes one way nearly all the time."""
     directions = np.sign(np.diff([tone.frequency_hz for tone in tones]))
     return len(directions) > 1 and abs(np.sum(directions)) >= 0.8 * len(directions)
+
+
+def _passed(moving, rate):
+    """What kind of sweep it is, and its first and last frequency [Hz]; None without one.
+
+    A fast sweep has no stretch of straight phase, but its phase is a parabola in each block.
+    """
+    n = len(moving)
+    size = max(_OF_CHIRP, n // _CHIRPS)
+    count = n // size
+    if count < _CHIRPS // 4:
+        return None
+    analytic = hilbert(moving, next_fast_len(n))[:count * size]
+    phase = np.unwrap(np.angle(analytic)).reshape(count, size)
+    energy = np.sum(np.abs(analytic.reshape(count, size))**2, axis=1)
+    place = np.arange(size) - (size - 1) / 2
+    rows = np.linalg.qr(np.stack([np.ones(size), place, place**2], axis=1))[0]
+    left = phase - (phase @ rows) @ rows.T
+    # the whole of each block, so that noise counts for less
+    frequency = phase @ place / (place @ place) * rate / (2 * np.pi)
+    loud = energy > _LOUD**2 * energy.max()
+    good = loud & (np.sqrt(np.mean(left**2, axis=1)) < _STRAIGHT) & (frequency > 0)
+    # at both ends the analytic signal is not what its name says
+    good[:2] = good[-2:] = False
+    block, frequency = np.flatnonzero(good), frequency[good]
+    if energy[good].sum() < _TONAL * energy.sum() or len(block) < _CHIRPS // 4:
+        return None
+    steps = np.sign(np.diff(frequency))
+    if abs(steps.sum()) < 0.8 * len(steps) or np.ptp(frequency) * n / rate < len(block):
+        return None
+    ends = np.flatnonzero(loud)[[0, -1]] + [-0.5, 0.5]
+    evenly = [abs(np.corrcoef(block, values)[0, 1]) for values in (frequency, np.log(frequency))]
+    if max(evenly) < _EVEN:
+        return "swept sine", frequency[0], frequency[-1]
+    if evenly[0] >= evenly[1]:
+        return "swept sine", *np.maximum(np.polyval(np.polyfit(block, frequency, 1), ends), 0)
+    return "logarithmically swept sine", *np.exp(np.polyval(np.polyfit(
+        block, np.log(frequency), 1), ends))
 
 
 def _band(moving, rate):
