@@ -251,7 +251,7 @@ def _passed(moving, rate):
     count = n // size
     if count < _CHIRPS // 4:
         return None
-    analytic = hilbert(moving, next_fast_len(n))[:count * size]
+    analytic = _analytic(moving, next_fast_len(n))[:count * size]
     phase = np.unwrap(np.angle(analytic)).reshape(count, size)
     energy = np.sum(np.abs(analytic.reshape(count, size))**2, axis=1)
     place = np.arange(size) - (size - 1) / 2
