@@ -342,14 +342,20 @@ def _classical(record, axis, used, limit):
 def _gain_of_related(record, column, used):
     """Gain of fast motion where a sensor follows the reference through some filter, such as one
     that takes most of the motion away, though no classical sensor does; else None."""
-    measured, reference = record.sensor[:, column], record.reference[:, column]
-    follows, share = related(measured, reference, used)
+    follows, share = _related_in_fast_motion(record.sensor[:, column], record.reference[:, column],
+                                             used)
     if not follows or share < _FOLLOWS:
         return None
+    answer, moved = (np.diff(values[:, column])[used[1:] & used[:-1]]
+                     for values in (record.sensor, record.reference))
+    return float(moved @ answer / max(moved @ moved, 1e-300)) or None
+
+
+def _related_in_fast_motion(measured, expected, used):
+    """As `related`, by what changes from sample to sample: slow motion, which a high-pass takes
+    away, says nothing then."""
     both = used[1:] & used[:-1]
-    moved, wanted = (np.diff(values)[both] for values in (reference, measured))
-    gain = float(moved @ wanted / max(moved @ moved, 1e-300))
-    return gain if gain else None
+    return related(*(np.where(both, np.diff(values), 0.0) for values in (measured, expected)), both)
 
 
 def _stated_noise(samples, column):
@@ -384,7 +390,7 @@ def _require_relation(engine, axis, seed):
     start = p.simulate({**engine.search.base, **(seed or {})})
     _require_direction(engine, axis, start)
     follows, share = related(p.measured, start, p.used)
-    if follows:
+    if follows or _related_in_fast_motion(p.measured, start, p.used)[0]:
         return
     hint = turned_away(p.record, axis) or "they do not belong together"
     raise FracAccelError(f"axis {axis}: the sensor does not follow the reference (they share "

@@ -1,0 +1,91 @@
+"""A high-pass of sensor or reference: under gravity, where it takes most of the motion away, and in
+a sweep beside slow noise."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, lfilter, sosfiltfilt
+
+from frac_accel import FracAccelError, Samples, diagnose
+
+FINE = 8
+
+
+def high_passed(values, rate, corner_hz):
+    """The exact high-pass of straight lines between fine samples, from its steady state."""
+    w = 2 * np.pi * corner_hz / rate
+    pole = np.exp(-w)
+    slopes = np.diff(values, prepend=values[0])
+    return lfilter([(1 - pole) / w], [1, -pole], slopes)
+
+
+def pair(rate, reference, sensor, axis):
+    at = np.round(1e9 * (50 + np.arange(len(reference)) / rate))
+    across = np.eye(3)["xyz".index(axis)]
+    return tuple(Samples.of(at, np.outer(values, across)) for values in (reference, sensor))
+
+
+def road(rng, rate, seconds, low_hz, high_hz):
+    sos = butter(6, [low_hz, high_hz], "band", fs=FINE * rate, output="sos")
+    return sosfiltfilt(sos, rng.normal(size=int(FINE * rate * seconds)))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_ac_coupling_of_a_vertical_axis(seed):
+    """It takes all of gravity away, which an offset does as well."""
+    rng, rate = np.random.default_rng(seed), 200.0
+    motion = road(rng, rate, 100, 0.3, 40.0)
+    motion = 9.81 + motion / motion.std()
+    corner = np.exp(rng.uniform(np.log(0.1), np.log(1.0)))
+    sensor = 0.97 * high_passed(motion, FINE * rate, corner)[::FINE]
+    reference = motion[::FINE]
+    n = len(reference)
+    found = diagnose(pair(rate, reference + 0.003 * rng.normal(size=n),
+                          sensor + 0.005 * rng.normal(size=n), "z"), axis="z", time_limit_s=60)
+    named = {f.cause: f for f in found.findings}
+    assert set(named) - {"offset"} == {"ac_coupling"}
+    assert named["ac_coupling"].effect.corner_hz == pytest.approx(corner, rel=0.02)
+    assert found.verdict == "explained"
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_ac_coupling_that_takes_most_of_the_motion_away(seed):
+    """No classical sensor describes a tenth of it, so that the record was refused."""
+    rng, rate = np.random.default_rng(seed), 200.0
+    fast, slow = road(rng, rate, 80, 0.5, 40.0), road(rng, rate, 80, 0.02, 0.1)
+    motion = 0.1 * fast / fast.std() + slow / slow.std()
+    corner = rng.uniform(1.0, 1.5)
+    sensor = high_passed(motion, FINE * rate, corner)[::FINE]
+    n = len(sensor)
+    found = diagnose(pair(rate, motion[::FINE] + 0.0005 * rng.normal(size=n),
+                          sensor + 0.0005 * rng.normal(size=n), "y"), axis="y", time_limit_s=60)
+    cause, = found.findings
+    assert cause.cause == "ac_coupling"
+    assert cause.effect.corner_hz == pytest.approx(corner, rel=0.02)
+
+
+def test_what_follows_nothing_is_still_refused():
+    rng, rate = np.random.default_rng(6), 200.0
+    signals = [road(rng, rate, 80, 0.5, 40.0)[::FINE] for _ in range(2)]
+    with pytest.raises(FracAccelError):
+        diagnose(pair(rate, *signals, "y"), axis="y")
+
+
+@pytest.mark.parametrize("seed", [7, 8])
+def test_a_reference_behind_a_high_pass_in_a_sweep_beside_slow_noise(seed):
+    """What stands for the slow noise has no name, and takes none from the high-pass."""
+    rng, rate, seconds = np.random.default_rng(seed), 400.0, 25.0
+    t = np.arange(0, seconds, 1 / (FINE * rate))
+    motion = 3 * np.sin(2 * np.pi * (0.3 * t + 0.5 * (20 - 0.3) / seconds * t**2))
+    corner = rng.uniform(0.35, 0.6)
+    recorded = high_passed(motion, FINE * rate, corner)[::FINE]
+    n = len(recorded)
+    slow = lfilter([1], [1, -0.9995], rng.normal(size=n))
+    reference = recorded + 0.002 * slow / slow.std() + 0.001 * rng.normal(size=n)
+    late = CubicSpline(t, motion)(t[::FINE] - 1e-4)
+    found = diagnose(pair(rate, reference, 0.99 * late + 0.01 * rng.normal(size=n), "x"),
+                     time_limit_s=60)
+    named = {f.cause: f for f in found.findings}
+    assert set(named) - {"time_delay", "offset"} == {"reference_ac_coupling"}
+    assert named["reference_ac_coupling"].effect.corner_hz == pytest.approx(corner, rel=0.02)
+    assert found.verdict == "explained"
