@@ -51,9 +51,10 @@ _NEARLY = 0.05
 _COMMON = 0.1
 # Share of the error that all else leaves up to which what is only suspected describes a record.
 _CLEARLY = 0.9
-# Share of what is left (power) that may follow the motion in a record that counts as consistent,
-# where so little is left that it need not be noise.
-_HINT = 0.1
+# Share of what is left (power) that may be no noise in a record that counts as consistent, where so
+# little is left that it need not be noise; more of it where that is such a share of the output
+# (RMS) at most.
+_HINT, _MUCH, _UNSEEN = 0.1, 0.3, 0.005
 # Share of what each named cause takes (RMS) up to which another one is minor; of a filter, which
 # may mend what a named one lacks.
 _MINOR, _MINOR_FILTER = 0.1, 0.05
@@ -287,15 +288,15 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     account = _account(engine, fitted, findings, noise)
     strange = engine.structure(fitted)
     # beside a model that leaves nothing that stands out, what is only suspected is chance, and a
-    # hint of the motion in what is left is no reason to call the record unexplained
-    follows = engine.left(fitted).share
-    plain = not findings and not strange and (
-        follows == 0 or account.accounted and follows < _HINT)
+    # hint of structure in what is left is no reason to call the record unexplained
+    hint = max(engine.left(fitted).share, sum(share for share, _ in strange))
+    plain = not findings and (hint == 0 or account.accounted and (
+        hint < _HINT or hint < _MUCH and np.sqrt(hint) * account.share < _UNSEEN))
     verdict = verdict_of(
         findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
-        fraction, account.accounted, strange or account.faulty)
+        fraction, account.accounted, (strange and not plain) or account.faulty)
     described, kept, after, output = {}, {}, account.after, None
-    if verdict in _INCOMPLETE or strange:
+    if verdict in _INCOMPLETE or (strange and not plain):
         described, after, output = _described(engine, fitted, after, {part for _, part in strange})
         kept, after, output = _kept(engine, fitted, widest, after, output)
     named = {f.cause: f.effect for f in findings}
@@ -319,7 +320,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         + set_aside(engine.aside, engine.drowned, engine.record.valid)
         + description_words([] if kept else [*described.values()], unnamed,
                             sorted(kept.keys() - fitted.causes), after / spread)
-        + hint_words(follows if plain else 0.0)
+        + hint_words(hint if plain and not strange else 0.0)
         + hidden_words(account.own, account.error) + late,
         {"rmse": account.before, "nrmse": account.before / spread,
          "noise_rms": floor or left.noise_rms},

@@ -47,7 +47,8 @@ def reason_of(verdict, nrmse, noise, accounted, strange):
     parts = ", ".join(f"{share:.0%} {part} ({WORDS[part]})" for share, part in strange[:2])
     if strange:
         left += f", of which {parts}"
-    return {"consistent": f"the model explains the record {to}",
+    return {"consistent": f"the model explains the record {to}"
+                          + (f"; of what is left, {parts}" if strange else ""),
             "explained": f"the named causes explain the record {to}"
                          + (f"; of what is left, {parts}" if strange else ""),
             "partly_explained": "the named causes leave a part unexplained" + left,
