@@ -8,7 +8,7 @@ from scipy.fft import irfft, rfft
 
 from ..identification.response.recognise import recognise
 from ..record.resampling import BAND
-from . import repeats, shapes, unrelated
+from . import memory, repeats, shapes, unrelated
 from .blocks import FOLDS, Blocks, intervals
 from .filters import Filters
 from .modulated import Modulated
@@ -39,6 +39,8 @@ _SHAPE_LENGTHS = ((0, 0), (-1, 2), (-4, 12))
 _RINGING = (2, (-16, 112))
 # Counted samples for each coefficient.
 _SAMPLES = 10
+# A filter beside integrals of the motion, which does what they do not.
+_BESIDE = (-4, 8)
 # Power of an axis, of the strongest one's, from which it moves.
 _MOVES = 1e-10
 # Orders of the courses of slowly changing weights.
@@ -261,7 +263,7 @@ class _One:
         length = self.chosen.get("linear")
         if not isinstance(length, tuple):
             return
-        low, high = (lag * self.step for lag in length)
+        low, high = (lag * self.step for lag in length[:2])
         inside = np.zeros(self.r.n, bool)
         inside[max(high, 0):self.r.n + min(low, 0)] = True
         if np.sum(inside & self.r.used) > _STAYS * self.r.used.sum():
@@ -308,7 +310,7 @@ class _One:
         judged = self.counted
         best = first = self.leading = None
         best_gain, left = np.zeros(len(self.r.blocks)), float(target @ target)
-        worse = 0
+        worse, self.enough = 0, False
         for place, (name, size, make) in enumerate(self._candidates(part, target)):
             if part in self.chosen and name != self.chosen[part]:
                 continue
@@ -323,7 +325,10 @@ class _One:
                 self.leading = name
             else:
                 worse += 1
-                if worse > 1 and place >= (_ALWAYS_QUICK if self.r.quick else _ALWAYS):
+                self.enough = worse > 1 and place >= (
+                    _ALWAYS_QUICK if self.r.quick else _ALWAYS)
+                # beside filters there are other candidates than longer ones
+                if self.enough and part != "linear":
                     break
         if first is None:
             return None
@@ -370,12 +375,24 @@ class _One:
             return
         for place, length in enumerate(_LENGTHS):
             # a longer one is worth its time only where the one before is the best so far
-            if r.quick and place >= _QUICK_LENGTHS and "linear" not in self.chosen \
+            if self.enough or r.quick and place >= _QUICK_LENGTHS and "linear" not in self.chosen \
                     and self.leading != _LENGTHS[place - 1]:
-                return
+                break
             if r.fits(*_span(length), self.step):
                 yield length, _span(length)[0], lambda length=length: self._reference_filters(
                     length).predict(target, self.flagged)
+        else:
+            yield from self._with_the_output(target)
+        beside = [_BESIDE, self.leading] if "linear" not in self.chosen else _LENGTHS
+        for length in dict.fromkeys(beside):
+            if length not in _LENGTHS or not r.fits(*_span(length), self.step):
+                continue
+            size = _span(length)[0] + memory.count(length[1] * self.step, r.n)
+            yield (*length, "integrals"), size, lambda length=length: self._with_integrals(
+                length).predict(memory.without_drift(target), self.flagged)
+
+    def _with_the_output(self, target):
+        r = self.r
         alike = np.corrcoef(self.simulated[r.used], r.x[r.used])[0, 1] \
             if np.ptp(self.simulated[r.used]) else 1.0
         length = ((-1, 2), (-4, 8))
@@ -383,6 +400,16 @@ class _One:
             yield "both", 17, lambda: Filters(
                 [r.x, shapes.standardised(self.simulated, r.used)], length, r.blocks, r.used,
                 self.step).predict(target, self.flagged)
+
+    def _with_integrals(self, length):
+        """A filter of the reference beside integrals of it with longer memories."""
+        r = self.r
+
+        def make():
+            inputs = memory.integrals(r.x, length[1] * self.step)
+            return Filters([shapes.standardised(memory.without_drift(r.x), r.used), *inputs],
+                           [length] + [(0, 0)] * len(inputs), r.blocks, r.used, self.step)
+        return r.filters(("integrals", length, self.step), make)
 
     def _across_candidates(self, target):
         r = self.r
