@@ -1,16 +1,21 @@
-"""Inputs that remember for longer than a filter of a few lags: integrals of the motion."""
+"""Inputs that remember for longer than a filter of a few lags: integrals of the motion, and its
+level."""
 
 import numpy as np
 from scipy.fft import dct, idct
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import lfilter
 
-from .shapes import standardised
+from .shapes import cleared, standardised
 
 # Ratio of neighbouring times of forgetting, and the longest, as a share of the record.
 _RATIO = 4.0
 _LONGEST = 0.125
 # Half cycles in the record of what an integral must be faster than: slower ones resemble a drift.
 _DRIFTS = 8
+# Samples of the shortest memory of a level, and its scatter [of its mean] from which it changes.
+_SHORTEST = 8
+_STEADY = 0.02
 
 
 def _times(shortest, n):
@@ -55,3 +60,28 @@ def without_drift(values):
     lines = dct(values, norm="ortho")
     lines[:_DRIFTS] = 0.0
     return idct(lines, norm="ortho")
+
+
+def levels(motion, used):
+    """The motion times its level of the recent past, and times the root of that level.
+
+    A gain that follows the level is made of them. Each is without what a short filter of the motion
+    makes of it, and of RMS 1; the roots come first. None where the level hardly changes.
+    """
+    y = standardised(motion, used)
+    power = np.where(used, y**2, 1.0)
+    cycle = max(2 * len(y) // max(int(np.sum(y[1:] * y[:-1] < 0)), 1), _SHORTEST)
+    roots, squares = [], []
+    for time in _times(cycle, len(y)):
+        # without what it does within a cycle, which makes curves of the motion
+        level = uniform_filter1d(_followed(power, time), 2 * cycle)
+        if np.std(level[used]) > _STEADY * np.mean(level[used]):
+            squares.append(y * level)
+            roots.append(y * np.sqrt(np.maximum(level, 0.0)))
+    return cleared(roots + squares, y, used)
+
+
+def _followed(power, time):
+    """Power of the recent past, which forgets; before the record it was the usual one."""
+    keep = np.exp(-1 / time)
+    return lfilter([1 - keep], [1.0, -keep], power, zi=[keep])[0]
