@@ -8,7 +8,7 @@ from scipy.fft import irfft, rfft
 
 from ..identification.response.recognise import recognise
 from ..record.resampling import BAND
-from . import repeats, shapes, unrelated
+from . import memory, repeats, shapes, unrelated
 from .blocks import FOLDS, Blocks, intervals
 from .filters import Filters
 from .modulated import Modulated
@@ -16,6 +16,17 @@ from .modulated import Modulated
 # In the order in which they are taken from the residual.
 PARTS = ("bursts", "lines", "linear", "across", "even", "odd", "time_varying", "slow", "distortion",
          "reference", "noise")
+# The same where one part is taken in several pieces, each from what the others leave.
+_PIECES = {"lines": "lines", "linear": "linear", "across": "across", "even": "even", "odd": "odd",
+           "even_of_input": "even", "odd_of_input": "odd", "time_varying": "time_varying",
+           "level": "time_varying", "periodic": "time_varying", "slow": "slow",
+           "distortion": "distortion"}
+# Pieces of which other candidates are tried when longer ones of one kind no longer gain.
+_WHOLE_LISTS = ("linear", "time_varying")
+# Pieces that are none where they take nothing for sure: another of the same part has its share.
+_ONLY_SURE = ("even_of_input", "odd_of_input", "level", "periodic")
+# Pieces that a gain which follows the level resembles.
+_LIKE_LEVEL = ("odd", "odd_of_input")
 WORDS = {
     "linear": "a linear filter of this axis would take it",
     "across": "a linear filter of the other axes would take it",
@@ -39,8 +50,16 @@ _SHAPE_LENGTHS = ((0, 0), (-1, 2), (-4, 12))
 _RINGING = (2, (-16, 112))
 # Counted samples for each coefficient.
 _SAMPLES = 10
+# A filter beside integrals of the motion, which does what they do not.
+_BESIDE = (-4, 8)
+# Shapes of what drives the sensor are filtered as the motion is; correlation of both from which
+# they are those of the output.
+_DRIVEN_LENGTHS = ((0, 0), (-1, 2), (-4, 12))
+_SAME = 0.995
 # Power of an axis, of the strongest one's, from which it moves.
 _MOVES = 1e-10
+# Tones with which a gain may change, at most.
+_MODULATIONS = 4
 # Orders of the courses of slowly changing weights.
 _COURSES = (1, 2, 4, 8, 16)
 # Standard errors by which a longer filter must take more of the judged blocks, and by which the
@@ -216,6 +235,8 @@ class _One:
         self.inside = np.ones(record.n, bool)
         self.step = self._step()
         self.predicted, self.kept, self.chosen, self.sizes = {}, {}, {}, {}
+        # power that each piece takes of what is judged
+        self.taken = {}
 
     def _step(self):
         """Samples of a lag: more than one where motion and residual are far slower than that."""
@@ -261,7 +282,7 @@ class _One:
         length = self.chosen.get("linear")
         if not isinstance(length, tuple):
             return
-        low, high = (lag * self.step for lag in length)
+        low, high = (lag * self.step for lag in length[:2])
         inside = np.zeros(self.r.n, bool)
         inside[max(high, 0):self.r.n + min(low, 0)] = True
         if np.sum(inside & self.r.used) > _STAYS * self.r.used.sum():
@@ -284,17 +305,41 @@ class _One:
     def _pass(self):
         """Each part from what the others leave, in their order."""
         self.again = dict(self.predicted)
-        for part in PARTS[1:-2]:
-            # what repeats contains every other part of a repeated motion
-            others = [values for name, values in self.predicted.items()
-                      if name not in (part, "distortion") or part == "distortion" != name]
-            target = self.e - sum(others) if others else self.e.copy()
-            target[self.flagged] = 0.0
-            self.predicted.pop(part, None)
-            self.kept.pop(part, None)
-            made = self._best(part, target)
-            if made is not None:
-                self.predicted[part], self.kept[part] = made
+        first = "level" not in self.chosen
+        for piece in _PIECES:
+            if piece == "even" and first:
+                level = self._taken_by("level")
+            self._fit(piece)
+            if piece == _LIKE_LEVEL[-1] and first and level > sum(
+                    self.taken.get(name, 0.0) for name in _LIKE_LEVEL):
+                # what follows the level more than the instant is no curve
+                for name in _LIKE_LEVEL:
+                    self._forget(name)
+                for name in ("level", *_LIKE_LEVEL):
+                    self._fit(name)
+
+    def _taken_by(self, piece):
+        """Power that a piece takes alone; nothing of it is kept."""
+        self._fit(piece)
+        taken = self.taken.get(piece, 0.0)
+        self._forget(piece)
+        return taken
+
+    def _forget(self, piece):
+        for known in (self.predicted, self.kept, self.chosen, self.sizes, self.taken):
+            known.pop(piece, None)
+
+    def _fit(self, piece):
+        # what repeats contains every other part of a repeated motion
+        others = [values for name, values in self.predicted.items()
+                  if name not in (piece, "distortion") or piece == "distortion" != name]
+        target = self.e - sum(others) if others else self.e.copy()
+        target[self.flagged] = 0.0
+        for known in (self.predicted, self.kept, self.taken):
+            known.pop(piece, None)
+        made = self._best(piece, target)
+        if made is not None:
+            self.predicted[piece], self.kept[piece] = made
 
     @property
     def counted(self):
@@ -308,7 +353,7 @@ class _One:
         judged = self.counted
         best = first = self.leading = None
         best_gain, left = np.zeros(len(self.r.blocks)), float(target @ target)
-        worse = 0
+        worse, self.enough = 0, False
         for place, (name, size, make) in enumerate(self._candidates(part, target)):
             if part in self.chosen and name != self.chosen[part]:
                 continue
@@ -323,19 +368,24 @@ class _One:
                 self.leading = name
             else:
                 worse += 1
-                if worse > 1 and place >= (_ALWAYS_QUICK if self.r.quick else _ALWAYS):
+                self.enough = worse > 1 and place >= (
+                    _ALWAYS_QUICK if self.r.quick else _ALWAYS)
+                if self.enough and part not in _WHOLE_LISTS:
                     break
         if first is None:
             return None
         if part not in self.chosen:
             self.chosen[part] = (best or first)[0]
+        if not best and part in _ONLY_SURE:
+            return None
         _, estimate, self.sizes[part] = best or first
+        self.taken[part] = float(best_gain.sum())
         return (estimate if best else np.zeros(self.r.n)), estimate
 
     def _gains(self, part, target, predicted):
         """Power that a prediction takes of each block; of shapes, of what neither a slow course nor
         folding at the Nyquist frequency would make as well."""
-        if part in ("even", "odd"):
+        if _PIECES[part] in ("even", "odd"):
             target, predicted = (self._shaped(values) for values in (target, predicted))
         return self.r.blocks.sums((2 * target - predicted) * predicted)
 
@@ -370,12 +420,24 @@ class _One:
             return
         for place, length in enumerate(_LENGTHS):
             # a longer one is worth its time only where the one before is the best so far
-            if r.quick and place >= _QUICK_LENGTHS and "linear" not in self.chosen \
+            if self.enough or r.quick and place >= _QUICK_LENGTHS and "linear" not in self.chosen \
                     and self.leading != _LENGTHS[place - 1]:
-                return
+                break
             if r.fits(*_span(length), self.step):
                 yield length, _span(length)[0], lambda length=length: self._reference_filters(
                     length).predict(target, self.flagged)
+        else:
+            yield from self._with_the_output(target)
+        beside = [_BESIDE, self.leading] if "linear" not in self.chosen else _LENGTHS
+        for length in dict.fromkeys(beside):
+            if length not in _LENGTHS or not r.fits(*_span(length), self.step):
+                continue
+            size = _span(length)[0] + memory.count(length[1] * self.step, r.n)
+            yield (*length, "integrals"), size, lambda length=length: self._with_integrals(
+                length).predict(memory.without_drift(target), self.flagged)
+
+    def _with_the_output(self, target):
+        r = self.r
         alike = np.corrcoef(self.simulated[r.used], r.x[r.used])[0, 1] \
             if np.ptp(self.simulated[r.used]) else 1.0
         length = ((-1, 2), (-4, 8))
@@ -383,6 +445,16 @@ class _One:
             yield "both", 17, lambda: Filters(
                 [r.x, shapes.standardised(self.simulated, r.used)], length, r.blocks, r.used,
                 self.step).predict(target, self.flagged)
+
+    def _with_integrals(self, length):
+        """A filter of the reference beside integrals of it with longer memories."""
+        r = self.r
+
+        def make():
+            inputs = memory.integrals(r.x, length[1] * self.step)
+            return Filters([shapes.standardised(memory.without_drift(r.x), r.used), *inputs],
+                           [length] + [(0, 0)] * len(inputs), r.blocks, r.used, self.step)
+        return r.filters(("integrals", length, self.step), make)
 
     def _across_candidates(self, target):
         r = self.r
@@ -417,6 +489,29 @@ class _One:
                     yield (count, length), count * size, functools.partial(
                         self._filtered, inputs[:count], length, target)
 
+    def _even_of_input_candidates(self, target):
+        return self._driven_candidates(shapes.even_of_input, target)
+
+    def _odd_of_input_candidates(self, target):
+        return self._driven_candidates(shapes.odd_of_input, target)
+
+    def _driven_candidates(self, make, target):
+        """Shapes of the reference through the filter that makes the output of it."""
+        r = self.r
+        output = self._outputs()[0]
+        if not r.moves or abs(np.corrcoef(output[r.used], r.x[r.used])[0, 1]) > _SAME:
+            return
+        lengths = [length for length in _LENGTHS[:_QUICK_LENGTHS]
+                   if r.fits(*_span(length), self.step)]
+        if not lengths:
+            return
+        inputs = self._reference_filters(lengths[-1]).passed(output, make(r.x, r.used))
+        for length in _DRIVEN_LENGTHS:
+            size, span = _span(length)
+            if r.fits(len(inputs) * size, span, self.step):
+                yield length, len(inputs) * size, functools.partial(
+                    self._filtered, inputs, length, target)
+
     def _filtered(self, inputs, length, target):
         return Filters(inputs, [length] * len(inputs), self.r.blocks, self.r.used,
                        self.step).predict(target, self.flagged)
@@ -426,18 +521,15 @@ class _One:
         linear = self.simulated + self.predicted.get("linear", 0.0)
         if not np.ptp(linear):
             linear = self.r.x
-        more = sum((self.again.get(part, 0.0) for part in ("even", "odd")), np.zeros(self.r.n))
+        more = sum((values for piece, values in self.again.items()
+                    if _PIECES[piece] in ("even", "odd")), np.zeros(self.r.n))
         return [linear, linear + more] if more.any() else [linear]
 
     def _time_varying_candidates(self, target):
         r = self.r
         if not r.moves:
             return
-        y = shapes.standardised(self._outputs()[0], r.used)
-        v = shapes.standardised(np.gradient(y), r.used)
-        bases = [y, v, shapes.standardised(np.gradient(v), r.used)]
-        if abs(np.corrcoef(y[r.used], r.x[r.used])[0, 1]) < 0.999:
-            bases.append(shapes.standardised(r.x, r.used))
+        bases = self._bases()
 
         def columns(start, stop):
             return np.stack([base[start:stop] for base in bases], axis=1)
@@ -446,6 +538,64 @@ class _One:
             if count * len(bases) * _SAMPLES <= r.used.sum() and 2 * count <= len(r.blocks):
                 yield count, count * len(bases), lambda count=count: waves.predict(
                     range(1, count + 1))
+
+    def _bases(self):
+        """What a gain, a timing and the dynamics that change are multiplied with."""
+        r = self.r
+        y = shapes.standardised(self._outputs()[0], r.used)
+        v = shapes.standardised(np.gradient(y), r.used)
+        bases = [y, v, shapes.standardised(np.gradient(v), r.used)]
+        if abs(np.corrcoef(y[r.used], r.x[r.used])[0, 1]) < 0.999:
+            bases.append(shapes.standardised(r.x, r.used))
+        return bases
+
+    def _level_candidates(self, target):
+        """Gain that follows the motion's level, whose past counts."""
+        r = self.r
+        if not r.moves:
+            return
+        inputs = memory.levels(self._outputs()[0], r.used)
+        if not inputs:
+            return
+        for count, length in ((len(inputs) // 2, (0, 0)), (len(inputs), (0, 0)),
+                              (len(inputs), (-1, 2))):
+            size, span = _span(length)
+            if r.fits(count * size, span, self.step):
+                yield (count, length), count * size, functools.partial(
+                    self._filtered, inputs[:count], length, target)
+
+    def _periodic_candidates(self, target):
+        """Gain or timing that changes with tones which the motion does not have."""
+        r = self.r
+        if not r.moves:
+            return
+        bases = self._bases()
+        if "periodic" not in self.chosen:
+            self.modulation = self._modulation(target, bases[:2])
+        if not len(self.modulation):
+            return
+        waves = unrelated.tone_waves(self.modulation)
+
+        def columns(start, stop):
+            turns = waves(start, stop)
+            return np.concatenate([base[start:stop, None] * turns for base in bases], axis=1)
+        size = 2 * len(self.modulation) * len(bases)
+        modulated = Modulated(columns, target, self.counted, r.blocks)
+        for orders in unrelated.LINE_COURSES[:2]:
+            if size * orders * _SAMPLES <= r.used.sum() and 2 * orders <= len(r.blocks):
+                yield orders, size * orders, lambda orders=orders: modulated.predict(range(orders))
+
+    def _modulation(self, target, bases):
+        """Tones [cycles per sample] of what is left times the motion, which its square has not."""
+        r = self.r
+        rest = np.where(self.counted, self._shaped(np.where(self.counted, target, 0.0)), 0.0)
+        ratio = unrelated.spectrum_peaks(np.where(r.used, bases[0]**2, 1.0) - 1.0)[2]
+        found = []
+        for base in bases:
+            for tone in unrelated.tones(rest * base, ratio, r.tones, r.period, self.counted):
+                if all(abs(tone - other) > 3 / r.n for other in found):
+                    found.append(tone)
+        return np.array(found[:_MODULATIONS])
 
     def _slow_candidates(self, target):
         for count, values in enumerate(unrelated.slow_candidates(
@@ -470,10 +620,11 @@ class _One:
         names, products, reductions = ["bursts"], [burst], [burst]
         spectra = {"bursts": (np.where(self.flagged, self.e, 0.0),) * 2}
         left = sure.copy()
-        for part in PARTS[1:-2]:
+        pieces = list(_PIECES)
+        for part in pieces:
             if part not in self.kept:
                 continue
-            later = sum((self.predicted[name] for name in PARTS[PARTS.index(part) + 1:]
+            later = sum((self.predicted[name] for name in pieces[pieces.index(part) + 1:]
                          if name in self.predicted and name != "distortion"), np.zeros(r.n))
             estimate = np.where(counted, self.kept[part], 0.0)
             # what is taken is taken from what the earlier ones left: so do the shares add up
@@ -512,7 +663,7 @@ class _One:
             parted = repeats.by_parity(estimate, self.r.x, self.r.period)
             if parted is not None:
                 return list(zip(("even", "odd"), parted))
-        return [(part, estimate)]
+        return [(_PIECES[part], estimate)]
 
     def _made(self, names, products, power, reductions=None, weights=None, spectra=()):
         r = self.r

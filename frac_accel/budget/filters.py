@@ -10,6 +10,8 @@ from .blocks import FOLDS
 # Ridges, of the products of inputs scaled to the same size: what the excitation hardly holds must
 # not be fitted to noise.
 _RIDGES = (1e-9, 1e-6, 1e-4, 1e-2)
+# And where the target is free of noise.
+_NO_NOISE = 1e-12
 # Samples that are enough to learn from: of longer records, the first part of each block.
 _ENOUGH = 150_000
 
@@ -89,6 +91,31 @@ class Filters:
             result = self._predict(values, None if left_out is None else left_out[::self._step])
             return _thickened(result, self._step, len(target))
         return self._predict(target, left_out)
+
+    def passed(self, target, others):
+        """Other signals through the filter of the first input that fits a target best.
+
+        Parameters
+        ----------
+        target : ndarray, shape (n,)
+        others : list of ndarray, shape (n,)
+
+        Returns
+        -------
+        list of ndarray, shape (n,)
+        """
+        step, span = self._step, self._lags[0]
+        values = np.where(self._all, target, 0.0)
+        values = _thinned(values, step) if step > 1 else values
+        right = sum(self._right(values, *run) for run in self._learnt)
+        taps = solve(self._whole, right, _NO_NOISE)[:span[1] - span[0] + 1]
+        result = []
+        for other in others:
+            other = _thinned(other, step) if step > 1 else other
+            run = self._run(other, -span[1], len(other) - span[0])
+            through = oaconvolve(run, taps, "valid")
+            result.append(_thickened(through, step, len(target)) if step > 1 else through)
+        return result
 
     def _predict(self, target, left_out):
         used, gram, unseen = self._used, self._whole, self._unseen

@@ -19,14 +19,26 @@ def standardised(values, used):
 def even(motion, used):
     """Shapes that stay as they are when the motion changes its sign; the likeliest ones first."""
     y, v = _motion_and_velocity(motion, used)
-    return _cleared([y**2, v**2, y * v, np.abs(y), np.abs(v)], y, used)
+    return cleared([y**2, v**2, y * v, np.abs(y), np.abs(v)], y, used)
 
 
 def odd(motion, used):
     """Shapes that change their sign with the motion; the likeliest ones first."""
     y, v = _motion_and_velocity(motion, used)
-    return _cleared([y**3, np.tanh(v / _TURN), v * np.abs(v), np.tanh(y / 0.3), y**5, y * v**2,
+    return cleared([y**3, np.tanh(v / _TURN), v * np.abs(v), np.tanh(y / 0.3), y**5, y * v**2,
                      y**2 * v], y, used)
+
+
+def even_of_input(motion, used):
+    """The same of what drives the sensor, before it rings."""
+    x = standardised(motion, used)
+    return cleared([x**2, np.abs(x), x**4], x, used)
+
+
+def odd_of_input(motion, used):
+    """Shapes of what drives the sensor that change their sign with it."""
+    x = standardised(motion, used)
+    return cleared([x**3, np.tanh(x / 0.3), x * np.abs(x), np.tanh(x / 0.05), x**5], x, used)
 
 
 def _motion_and_velocity(motion, used):
@@ -34,7 +46,7 @@ def _motion_and_velocity(motion, used):
     return y, standardised(np.gradient(y), used)
 
 
-def _cleared(shapes, y, used):
+def cleared(shapes, y, used):
     """Shapes without what a short filter of the motion makes of them, each of RMS 1.
 
     It is no more than their linear part, which the linear part of the budget has taken already.
