@@ -72,6 +72,8 @@ _NO_PEAK, _FAR_LATER = 0.8, 10.0
 _OF_CONSTANT = 0.3
 # Share of that constant up to which an offset has left nothing of it.
 _CANCELLED = 0.02
+# Share of the highest frequency that is compared from which a peak lies at its end.
+_EDGE = 0.95
 # Damping ratio below which a link has a peak, and times what is left within half an octave of it
 # (RMS) that it must then take.
 _PEAKED, _AT_PEAK = 0.1, 10.0
@@ -130,6 +132,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                                      "one cause that is not known")
     for cause, words in {**_parts_of_a_law(best, takes, added, left),
                          **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
+                         **_at_the_edge(engine, best),
                          **_corrections(engine, best, takes)}.items():
         doubts.setdefault(cause, words)
     if gains and (left.share > 0 or not engine.is_accounted(best, noise)):
@@ -139,16 +142,23 @@ def doubts_about(engine, best, gains, stds, left, noise):
 
 
 def _as_slow(engine, best, added, takes):
-    """Slow causes beside which what is left wanders nearly as much: noise with a long memory."""
+    """Slow causes beside which what is left wanders nearly as much: noise with a long memory; and
+    any beside a high-pass of the reference that is turned back, which gives its noise one."""
     p, found = engine.problem, {}
+    turned_back = [cause for cause, effect in best.effects.items() if np.any(effect.poles() == 0)]
 
     def slow(values):
         return engine.rms(uniform_filter1d(values, max(p.count // _SLOW_PARTS, 1)))
     wanders = slow(best.residual)
     for cause, change in added.items():
-        if takes[cause] < _SLOW_TIMES * wanders and slow(change) > _SLOW_SHARE * engine.rms(change):
+        if cause in turned_back or slow(change) <= _SLOW_SHARE * engine.rms(change):
+            continue
+        if takes[cause] < _SLOW_TIMES * wanders:
             found[cause] = f"what it explains is slow ({takes[cause]:.3g} RMS), and what is left " \
                            f"wanders by {wanders:.3g} RMS"
+        elif turned_back:
+            found[cause] = f"what it explains is slow ({takes[cause]:.3g} RMS), as the " \
+                           f"reference's own noise is where {turned_back[0]} is turned back"
     return found
 
 
@@ -444,6 +454,21 @@ def _beyond_the_motion(engine, best):
     return found
 
 
+def _at_the_edge(engine, best):
+    """Links that ring at the end of what is compared: what one of the two has lost there, or was
+    put on other instants with, looks the same."""
+    p, found = engine.problem, {}
+    edge = p.record.band_hz or p.rate / 2
+    for cause, effect in _filters(engine, best).items():
+        poles = np.atleast_1d(effect.poles()) if is_link(effect) else np.zeros(0)
+        ringing = poles[(poles.imag != 0) & (-poles.real < _PEAKED * np.abs(poles))]
+        peaks = np.abs(ringing) / (2 * np.pi)
+        if np.any((peaks > _EDGE * edge) & (peaks < edge / _EDGE)):
+            found[cause] = f"it rings at {peaks.max():.3g} Hz, at the end of what is compared " \
+                           f"({edge:.3g} Hz): what one of the two has lost there looks the same"
+    return found
+
+
 def _on_both_sides(engine, best):
     """Filters of the sensor and of the reference that undo each other at an end of the band, or
     where the motion ends."""
@@ -558,6 +583,16 @@ def within_own_delay(engine, best, effect):
         return (f"a delay of {delay:.3g} s beside a core without a peak whose own is {own:.3g} s: "
                 "other filters do the same with another delay")
     return ""
+
+
+def delay_of_unseen_core(engine, best):
+    """Delay [s] of slow motion in a core that was identified, but resonates beyond all that is
+    compared: it may be one of something else, or of none; otherwise 0."""
+    core, p = engine.problem.axis_model(best.effects).effective_core, engine.problem
+    if not isinstance(core, Oscillator) or not _core_is_identified(engine) \
+            or core.natural_frequency_hz < (p.record.band_hz or p.rate / 2):
+        return 0.0
+    return core.damping_ratio / (np.pi * core.natural_frequency_hz)
 
 
 def _acausal(engine, best, stds):

@@ -11,7 +11,14 @@ from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.effects import IDENTIFIED, effect_of, known_effects
 from ..model.effects.base import OFFSET
-from .doubts import by_what_is_left, doubts_about, left_open, resembles, within_own_delay
+from .doubts import (
+    by_what_is_left,
+    delay_of_unseen_core,
+    doubts_about,
+    left_open,
+    resembles,
+    within_own_delay,
+)
 from .empirical import fit_empirical_link
 from .empirical_map import fit_empirical_map
 from .engine import WEIGHS
@@ -313,6 +320,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     at_limit = engine.at_limit if any(f.effect.read_off for f in findings) else None
     rest = engine.budget(fitted, at_limit) if output is None else \
         engine.budget_between(p.measured, output, p.record.valid)
+    findings = [_beside_unseen_core(f, delay_of_unseen_core(engine, fitted)) for f in findings]
     if p.in_own_core:
         model, findings = in_own_core(model, findings, p.in_own_core, AXES[p.axis])
     return Diagnosis(
@@ -332,6 +340,19 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         noise.as_dict(), p.limit.summary(),
         [*engine.budget(engine.search.baseline).as_list("baseline"),
          *rest.as_list("extended")])
+
+
+def _beside_unseen_core(finding, delay_s):
+    """A finding whose delay is as uncertain as one that the core has, and may not have, makes it.
+
+    Both ends of a uniform distribution (JCGM 100:2008, 4.3.7).
+    """
+    if not delay_s or is_link(finding.effect) or not finding.effect.pure_delay_s():
+        return finding
+    std = {**finding.std, "delay_s": float(np.hypot(finding.std["delay_s"], delay_s / np.sqrt(3)))}
+    return dataclasses.replace(finding, std=std, evidence=[
+        *finding.evidence, f"the core resonates beyond all that is compared: of its own delay, "
+                           f"{delay_s:.3g} s, as much may belong here"])
 
 
 def _stated(problem, fitted, nrmse):
