@@ -72,6 +72,8 @@ _NO_PEAK, _FAR_LATER = 0.8, 10.0
 _OF_CONSTANT = 0.3
 # Share of that constant up to which an offset has left nothing of it.
 _CANCELLED = 0.02
+# Share of the output (RMS) from which a force is strong.
+_STRONG = 0.3
 # Share of the highest frequency that is compared from which a peak lies at its end.
 _EDGE = 0.95
 # Damping ratio below which a link has a peak, and times what is left within half an octave of it
@@ -79,8 +81,9 @@ _EDGE = 0.95
 _PEAKED, _AT_PEAK = 0.1, 10.0
 _MORE = ("a linear filter would take another {:.0%} of what is left: the linear causes only "
          "imitate the true response")
-# Share of what is left that changes with time from which filters may be a mean of what moves.
-_VARYING = 0.5
+# Share of what is left that changes with time from which filters may be a mean of what moves, and
+# times that (RMS) that one of them must then take.
+_VARYING, _MOVES = 0.5, 10.0
 _MOVING = ("{:.0%} of what is left changes with time: the linear causes may be the mean of what "
            "moves")
 
@@ -131,6 +134,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
             doubts.setdefault(cause, f"it nearly cancels {other}: together they may stand for "
                                      "one cause that is not known")
     for cause, words in {**_parts_of_a_law(best, takes, added, left),
+                         **_beside_a_strong_force(engine, best, takes, left, noise),
                          **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
                          **_at_the_edge(engine, best),
                          **_corrections(engine, best, takes)}.items():
@@ -139,6 +143,18 @@ def doubts_about(engine, best, gains, stds, left, noise):
         for cause, words in engine.unstable(best).items():
             doubts.setdefault(cause, words)
     return {cause: words for cause, words in doubts.items() if cause in gains}
+
+
+def _beside_a_strong_force(engine, best, takes, left, noise):
+    """Links that take little beside a force as large as the spring's own: how that motion depends
+    on its start, which is not known, leaves more that looks like noise."""
+    strong = _STRONG * float(np.std(engine.problem.measured[engine.problem.used]))
+    if noise.rms is not None or not any(acts_on_spring(best.effects[cause]) and taken > strong
+                                        for cause, taken in takes.items()):
+        return {}
+    return {cause: f"it takes {taken:.3g} RMS beside a strong force, where {left.rms:.3g} are left "
+                   "that nothing shows to be noise" for cause, taken in takes.items()
+            if is_link(best.effects[cause]) and taken < WEIGHS * left.rms}
 
 
 def _as_slow(engine, best, added, takes):
@@ -218,9 +234,9 @@ def _imitators(engine, best, takes, left):
     varying = _share_of(engine, best, "time_varying")
     if varying > _VARYING and not share:
         # the mean of a delay or gain that moves is a filter, too
-        share, more = varying, _MOVING
+        share, more, clearly = varying, _MOVING, _MOVES
     else:
-        more = _MORE
+        more, clearly = _MORE, _RESEMBLES
     if not share:
         return {}
     rest = math.sqrt(share) * left.rms
@@ -234,7 +250,8 @@ def _imitators(engine, best, takes, left):
     most = max(takes.get(cause, np.inf) for cause in odd)
     main = [cause for cause in odd if takes.get(cause, np.inf) > _MENDS * most]
     clear = main if len(main) == 1 and most > rest * (
-        _RESEMBLES if filters[main[0]].everyday or share < _MOSTLY else _IMITATES) else []
+        clearly if more is _MOVING or filters[main[0]].everyday or share < _MOSTLY
+        else _IMITATES) else []
     if clear == odd:
         return {}
     linear = [cause for cause, effect in best.effects.items()

@@ -73,7 +73,8 @@ def test_what_follows_nothing_is_still_refused():
 
 @pytest.mark.parametrize("seed", [7, 8])
 def test_a_reference_behind_a_high_pass_in_a_sweep_beside_slow_noise(seed):
-    """What stands for the slow noise has no name, and takes none from the high-pass."""
+    """What stands for the slow noise has no name; the high-pass is named, or suspected with the
+    recording that would tell, and nothing else is."""
     rng, rate, seconds = np.random.default_rng(seed), 400.0, 25.0
     t = np.arange(0, seconds, 1 / (FINE * rate))
     motion = 3 * np.sin(2 * np.pi * (0.3 * t + 0.5 * (20 - 0.3) / seconds * t**2))
@@ -86,6 +87,12 @@ def test_a_reference_behind_a_high_pass_in_a_sweep_beside_slow_noise(seed):
     found = diagnose(pair(rate, reference, 0.99 * late + 0.01 * rng.normal(size=n), "x"),
                      time_limit_s=60)
     named = {f.cause: f for f in found.findings}
-    assert set(named) - {"time_delay", "offset"} == {"reference_ac_coupling"}
+    assert not set(named) - {"time_delay", "offset", "reference_ac_coupling"}
+    if "reference_ac_coupling" not in named:
+        suspected = [entry for entry in found.suspects
+                     if "reference_ac_coupling" in entry["causes"]]
+        assert suspected and "constant acceleration" in suspected[0]["experiment"]
+        assert found.extended["nrmse"] < 0.02  # the model has it as a description
+        return
     assert named["reference_ac_coupling"].effect.corner_hz == pytest.approx(corner, rel=0.02)
     assert found.verdict == "explained"

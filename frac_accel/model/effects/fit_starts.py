@@ -199,7 +199,10 @@ def by_equation(view, cause, power):
     if not view.is_motion or np.std(view.residual[view.used]) \
             < _STRONG * np.std(view.measured[view.used]):
         return []
-    found = view.equation.with_power(power)
+    try:
+        found = view.equation.with_power(power)
+    except ArithmeticError:
+        return []  # a core at the end of what is searched, whose poles are no numbers
     if found is None:
         return []
     core, coefficient = found
