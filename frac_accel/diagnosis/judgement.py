@@ -62,6 +62,8 @@ _CLEARLY = 0.9
 # little is left that it need not be noise; more of it where that is such a share of the output
 # (RMS) at most.
 _HINT, _MUCH, _UNSEEN = 0.1, 0.3, 0.005
+# Parts of it that this holds for: tones, bursts and what wanders are no hint of anything.
+_OF_MOTION = ("linear", "across", "even", "odd", "time_varying")
 # Share of what each named cause takes (RMS) up to which another one is minor; of a filter, which
 # may mend what a named one lacks.
 _MINOR, _MINOR_FILTER = 0.1, 0.05
@@ -297,7 +299,8 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     # beside a model that leaves nothing that stands out, what is only suspected is chance, and a
     # hint of structure in what is left is no reason to call the record unexplained
     hint = max(engine.left(fitted).share, sum(share for share, _ in strange))
-    plain = not findings and (hint == 0 or account.accounted and (
+    unrelated = [part for _, part in strange if part not in _OF_MOTION]
+    plain = not findings and not unrelated and (hint == 0 or account.accounted and (
         hint < _HINT or hint < _MUCH and np.sqrt(hint) * account.share < _UNSEEN))
     verdict = verdict_of(
         findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
