@@ -250,10 +250,9 @@ def drifting_lags(view):
         row[:] = irfft(np.conj(one) * other, _FINER * length)[lags]
     middle, found = (np.arange(_LINES) + 0.5) / _LINES, []
     for begins in (np.zeros(1, int), lags[::_FINER]):
-        # lags of the line at the record's end
-        place = np.round(begins[:, None, None] + (lags[:, None] - begins[:, None, None]) * middle)
-        place = place.astype(int) + reach
-        total = shared[np.arange(_LINES), place].sum(-1)
+        # by the lag of the line at the record's end; of all lines at once it would take tens of MB
+        total = np.stack([shared[np.arange(_LINES), reach + np.round(
+            begin + (lags[:, None] - begin) * middle).astype(int)].sum(-1) for begin in begins])
         begin, end = np.unravel_index(np.argmax(total), total.shape)
         found.append((float((lags[end] - begins[begin]) / (_FINER * count)),
                       float(begins[begin] / (_FINER * view.rate))))
