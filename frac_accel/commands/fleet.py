@@ -16,6 +16,7 @@ from ..io.outputs import say
 from ..io.topics import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC
 from ._common import STRUCTURES, add_filter, add_temperature, add_topics, positive, progress
 from ._fleet_row import row
+from .parser import Parser
 
 __all__ = ["EXAMPLES", "add_arguments", "row", "run"]
 
@@ -34,7 +35,8 @@ _MEMORY_MB = 1500.0
 
 def add_arguments(parser):
     """Options of the verb."""
-    verbs = parser.add_subparsers(dest="each", metavar="COMMAND", required=True)
+    verbs = parser.add_subparsers(dest="each", metavar="COMMAND", required=True,
+                                  parser_class=Parser)
     for verb, add in (("diagnose", _add_diagnose), ("correct", _add_correct),
                       ("identify", _add_identify), ("validate", _add_validate)):
         sub = verbs.add_parser(verb, help=f"{verb} every bag")
