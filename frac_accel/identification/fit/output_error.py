@@ -176,6 +176,7 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
             state = min(state, other, key=lambda state: state.cost)
         rough.require_relation(state)
         if rough.n == len(sensor):
+            rough, state = rough.within_delay(state, reference, sensor, valid)
             return rough.result(state, uncertainty)
         start = state.theta
         if very_long:
@@ -189,21 +190,22 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
         # a long sweep is loudest in a band that may have led astray
         state = min(state, problem.solve(problem.starts()), key=lambda state: state.cost)
     problem.require_relation(state)
+    problem, state = problem.within_delay(state, reference, sensor, valid)
     return problem.result(state, uncertainty)
 
 
 class _Problem:
     """Unknowns of the search: the structure's own and the delay in samples."""
 
-    def __init__(self, structure, reference, sensor, rate, valid, lag_s, held=None):
-        self.structure, self.rate, self.lag_s = structure, rate, lag_s
+    def __init__(self, structure, reference, sensor, rate, valid, lag_s, held=None, room=0):
+        self.structure, self.rate, self.lag_s, self.held = structure, rate, lag_s, held
         self.n = len(sensor)
         # the usual level is taken as steady before the record (its response is a constant), with
         # a smooth way from there to the first value
         self.level = np.median(reference)
         way = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, _WAY, endpoint=False))
         moving = np.r_[way * (reference[0] - self.level), reference - self.level]
-        self.convolution = Convolution(moving, rate, 2 * _EDGE / rate)
+        self.convolution = Convolution(moving, rate, max(2 * _EDGE, room) / rate)
         s = self.convolution.s
         # by blocks, of which temporary values are small
         self.blocks = [slice(at, at + _LINES) for at in range(0, len(s), _LINES)]
@@ -239,6 +241,19 @@ class _Problem:
             if state.cost < best.cost * (1 - 1e-9):
                 best = state
         return best
+
+    def within_delay(self, state, reference, sensor, valid):
+        """The problem and its state, or, where the delay is longer than the ends that do not count
+        anyway, without the samples whose motion lies beyond the reference's ends."""
+        late = state.theta[-1]
+        beyond = int(np.ceil(abs(late))) + _EDGE
+        if beyond <= 2 * _EDGE or beyond > self.n // 4:
+            return self, state
+        valid = np.ones(self.n, bool) if valid is None else valid.copy()
+        valid[slice(beyond) if late > 0 else slice(self.n - beyond, None)] = False
+        again = _Problem(self.structure, reference, sensor, self.rate, valid, self.lag_s,
+                         self.held, 2 * beyond)
+        return again, again.solve([state.theta])
 
     def ringing_starts(self):
         """Starting points where the loudest of the output is the sensor's own free motion."""

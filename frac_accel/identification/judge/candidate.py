@@ -218,7 +218,10 @@ def _astray(data):
 def _held_out(structure, fit, data):
     """Prediction of a part of the record by a model fitted to the rest alone."""
     valid = data.pair.valid
-    rest = held_out(data.reference, valid)
+    rest = held_out(data.reference, valid).copy()
+    # where the motion lies beyond the reference's ends, nothing can be predicted
+    late = int(np.round(fit["delay_s"] * data.pair.sampling_rate_hz))
+    rest[slice(late) if late > 0 else slice(len(rest) + late, None)] = False
     if min((valid & ~rest).sum(), (valid & rest).sum()) < _FEWEST:
         return _NOTHING
     try:

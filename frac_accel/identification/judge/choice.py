@@ -314,8 +314,11 @@ def _held_alike(structure, fits, datas):
 
 
 def _settled(structure, fit, data):
-    """Part of a record after the motion before it, which another record's model cannot know."""
+    """Part of a record after the motion before it, which another record's model cannot know, and
+    whose motion the reference has, however late it shows."""
     decay = np.abs(structure.core(fit).poles().real)
     slowest = np.min(decay, initial=np.inf)
     samples = _SETTLING * data.pair.sampling_rate_hz / slowest if slowest > 0 else np.inf
-    return slice(int(min(max(samples, _EDGE), len(data.sensor) // 4)), -_EDGE)
+    late = fit["delay_s"] * data.pair.sampling_rate_hz
+    most = len(data.sensor) // 4
+    return slice(int(min(max(samples, _EDGE + late), most)), -int(min(_EDGE + max(-late, 0), most)))
