@@ -308,7 +308,12 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     described, kept, after, output = {}, {}, account.after, None
     if verdict in _INCOMPLETE or (strange and not plain):
         described, after, output = _described(engine, fitted, after, {part for _, part in strange})
-        kept, after, output = _kept(engine, fitted, widest, after, output)
+        wider, after, output = _kept(engine, fitted, widest, after, output)
+        if wider is not None:
+            # named causes are what they are in the model that is written
+            kept, known = wider.effects, engine.uncertainties(wider)
+            findings = [dataclasses.replace(f, effect=kept[f.cause], std=known[f.cause])
+                        if f.cause in kept and f.cause in known else f for f in findings]
     named = {f.cause: f.effect for f in findings}
     effects, late = _of_reference(engine, {**fitted.effects, **named, **(kept or {
         effect.cause: effect for effect in described})}, named)
@@ -571,23 +576,23 @@ def _described(engine, fitted, after, parts):
 
 
 def _kept(engine, fitted, widest, after, output):
-    """Effects of a set with linear causes that are only suspected, where it predicts held-out data
-    clearly better than all else that describes them, its held-out error and its output; or none,
+    """Fit of a set with linear causes that are only suspected, where it predicts held-out data
+    clearly better than all else that describes them, its held-out error and its output; or None,
     and those given."""
     p, rest = engine.problem, engine.held_out_rows
     more = {cause: effect for cause, effect in widest.effects.items()
             if cause not in fitted.causes and (is_link(effect) or effect.pure_delay_s()
                                                or effect.is_constant or effect.restates_core)}
     if not more or p.limit.ends_judging("what is only suspected was not kept as a description"):
-        return {}, after, output
+        return None, after, output
     wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
     errors = [(p.measured - engine.learnt(fit).output)[rest] for fit in (fitted, wider)]
     error = _rms(p.measured - wider.output, rest)
     better = gain(*errors)
     if not better.is_relevant or engine.hollow(wider) \
             or max(error, _rms(errors[1], slice(None))) > _CLEARLY * after:
-        return {}, after, output
-    return wider.effects, error, wider.output
+        return None, after, output
+    return wider, error, wider.output
 
 
 def _of_reference(engine, effects, named):
