@@ -471,11 +471,21 @@ def _beyond_the_motion(engine, best):
     return found
 
 
+def _end_of_band_hz(problem):
+    """Highest frequency [Hz] that is compared."""
+    return problem.record.band_hz or problem.rate / 2
+
+
+def _own_delay_s(core):
+    """Delay [s] of slow motion in an oscillator, 2 zeta / omega_0."""
+    return core.damping_ratio / (np.pi * core.natural_frequency_hz)
+
+
 def _at_the_edge(engine, best):
     """Links that ring at the end of what is compared: what one of the two has lost there, or was
     put on other instants with, looks the same."""
     p, found = engine.problem, {}
-    edge = p.record.band_hz or p.rate / 2
+    edge = _end_of_band_hz(p)
     for cause, effect in _filters(engine, best).items():
         poles = np.atleast_1d(effect.poles()) if is_link(effect) else np.zeros(0)
         ringing = poles[(poles.imag != 0) & (-poles.real < _PEAKED * np.abs(poles))]
@@ -592,7 +602,7 @@ def within_own_delay(engine, best, effect):
     if not delay or effect.of_reference or not isinstance(core, Oscillator) \
             or not _core_is_identified(engine):
         return ""
-    own = core.damping_ratio / (np.pi * core.natural_frequency_hz)
+    own = _own_delay_s(core)
     if 0 > delay >= -_TAKEN_BACK * own:
         return (f"a lead of {-delay:.3g} s beside a resonance whose own delay is {own:.3g} s: a "
                 "soft mount resonates alike and does not delay")
@@ -607,9 +617,9 @@ def delay_of_unseen_core(engine, best):
     compared: it may be one of something else, or of none; otherwise 0."""
     core, p = engine.problem.axis_model(best.effects).effective_core, engine.problem
     if not isinstance(core, Oscillator) or not _core_is_identified(engine) \
-            or core.natural_frequency_hz < (p.record.band_hz or p.rate / 2):
+            or core.natural_frequency_hz < _end_of_band_hz(p):
         return 0.0
-    return core.damping_ratio / (np.pi * core.natural_frequency_hz)
+    return _own_delay_s(core)
 
 
 def _acausal(engine, best, stds):

@@ -176,7 +176,7 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
             state = min(state, other, key=lambda state: state.cost)
         rough.require_relation(state)
         if rough.n == len(sensor):
-            rough, state = rough.within_delay(state, reference, sensor, valid)
+            rough, state = rough.within_delay(state)
             return rough.result(state, uncertainty)
         start = state.theta
         if very_long:
@@ -190,7 +190,7 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
         # a long sweep is loudest in a band that may have led astray
         state = min(state, problem.solve(problem.starts()), key=lambda state: state.cost)
     problem.require_relation(state)
-    problem, state = problem.within_delay(state, reference, sensor, valid)
+    problem, state = problem.within_delay(state)
     return problem.result(state, uncertainty)
 
 
@@ -242,16 +242,16 @@ class _Problem:
                 best = state
         return best
 
-    def within_delay(self, state, reference, sensor, valid):
+    def within_delay(self, state):
         """The problem and its state, or, where the delay is longer than the ends that do not count
         anyway, without the samples whose motion lies beyond the reference's ends."""
         late = state.theta[-1]
         beyond = int(np.ceil(abs(late))) + _EDGE
         if beyond <= 2 * _EDGE or beyond > self.n // 4:
             return self, state
-        valid = np.ones(self.n, bool) if valid is None else valid.copy()
+        valid = self.used.copy()
         valid[slice(beyond) if late > 0 else slice(self.n - beyond, None)] = False
-        again = _Problem(self.structure, reference, sensor, self.rate, valid, self.lag_s,
+        again = _Problem(self.structure, self.reference, self.whole, self.rate, valid, self.lag_s,
                          self.held, 2 * beyond)
         return again, again.solve([state.theta])
 
