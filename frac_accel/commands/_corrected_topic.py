@@ -5,8 +5,8 @@ import collections
 import numpy as np
 
 from ..io.bag import cdr
-from ..io.motion import MovedMotion
 from ..streaming.batches import restamped
+from ..streaming.waiting_messages import WaitingMessages
 
 
 def temperatures_of(reader, topic, model):
@@ -26,9 +26,7 @@ class Sink:
         self._corrector, self._writer = corrector, writer
         self._temperatures = collections.deque(temperatures)
         self._type, self._topic = type_name, topic
-        self._motion = MovedMotion(type_name)
-        self._waiting = collections.deque()
-        self._first = 0
+        self._waiting = WaitingMessages(type_name)
         self._frame = ""
 
     def add(self, block, messages):
@@ -42,7 +40,7 @@ class Sink:
             return
         samples = block.samples()
         self._keep_raw(samples)
-        self._waiting.extend(zip(messages, block.log_times_ns.tolist()))
+        self._waiting.add(messages, block.log_times_ns.tolist())
         logs, start = block.log_times_ns, 0
         while start < len(logs):
             self._tell_temperature(logs[start])
@@ -85,12 +83,8 @@ class Sink:
         self._keep(ready)
         if not len(ready):
             return
-        # a sample that was never given out is dropped when a later one is
-        indices = ready.index.tolist()
-        passed = [self._waiting.popleft() for _ in range(indices[-1] + 1 - self._first)]
-        messages, logs = zip(*[passed[index - self._first] for index in indices])
-        self._first = indices[-1] + 1
-        messages = self._motion.moved(messages, self._corrector.design.sensor_delay_ns)
+        messages, logs = self._waiting.given(ready.index.tolist(),
+                                             self._corrector.design.sensor_delay_ns)
         patched = cdr.replace_samples(self._type, messages, ready.stamps_ns, ready.values,
                                       ready.variance)
         self._writer.write_many(self._topic, list(zip(patched, logs, logs)))

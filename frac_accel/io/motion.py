@@ -17,7 +17,7 @@ _ORIENTATION_COVARIANCE, _ANGULAR_VELOCITY, _ITS_COVARIANCE = 32, 104, 128
 
 
 class MovedMotion:
-    """Gives corrected messages their orientation and angular velocity, in blocks of any length.
+    """Takes orientation and angular velocity to another instant, in blocks of any length.
 
     Parameters
     ----------
@@ -30,10 +30,10 @@ class MovedMotion:
         self._past = np.empty(0, np.int64), np.empty((0, 7))
 
     def moved(self, messages, delay_ns):
-        """Messages as they come out, with these fields as they were `delay_ns` before the stamp.
+        """The next messages, with these fields as they were `delay_ns` before the stamp.
 
         A field that says of itself that it is not measured (REP-145: first element of its
-        covariance -1) stays, as does what came before the first message.
+        covariance -1) stays. Before the first message it is as that one says.
         """
         if not (self._is_imu and delay_ns and messages):
             return messages

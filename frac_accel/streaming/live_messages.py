@@ -6,9 +6,9 @@ import numpy as np
 
 from ..errors import BagError, FracAccelError
 from ..io import cdr
-from ..io.motion import MovedMotion
 from ..io.samples import Samples
 from .live_simulation import LiveSimulator
+from .waiting_messages import WaitingMessages
 
 # What can no longer come out, because its sample was dropped, is forgotten when this many wait.
 _FORGET_AT = 1000
@@ -68,7 +68,7 @@ class SampleMessages:
     """Messages of one sample each.
 
     Every output is the input message that it belongs to, with stamp, acceleration and covariance
-    replaced, and the rest of the motion taken to the new instant (`MovedMotion`).
+    replaced, and the rest of the motion taken to the new instant (`WaitingMessages`).
 
     Parameters
     ----------
@@ -91,18 +91,14 @@ class SampleMessages:
         self._frame_id = frame_id
         self.malformed = 0
         self._type_name = type_name
-        self._motion = MovedMotion(type_name)
+        self._waiting = WaitingMessages(type_name)
         self._plain = plain
-        self._count = 0
-        self._waiting = {}
 
     def process(self, messages, arrivals_ns):
         """`Processed` of the next messages; raises as `Stream.process`."""
         messages, arrivals_ns, samples = _read(self._type_name, messages, arrivals_ns, self._plain,
                                                self._count_malformed)
-        numbers = range(self._count, self._count + len(messages))
-        self._count = numbers.stop
-        self._waiting.update(zip(numbers, zip(messages, arrivals_ns)))
+        self._waiting.add(messages, arrivals_ns)
         return self._taken(samples, self.stream.process(*samples[:3]))
 
     def replace(self, model, wishes):
@@ -110,18 +106,16 @@ class SampleMessages:
         return self._taken(_nothing(), self.stream.replace(model, **wishes))
 
     def _taken(self, samples, filtered):
-        given = [self._waiting.pop(index) for index in filtered.index.tolist()]
+        delay_ns = self.stream.design.sensor_delay_ns if self.stream.design else 0
+        messages, arrivals_ns = self._waiting.given(filtered.index.tolist(), delay_ns)
         if len(self._waiting) > _FORGET_AT:
-            self._waiting = {index: self._waiting[index] for index in self.stream.waiting.tolist()}
-        messages = [message for message, _ in given]
-        if given:
-            messages = self._motion.moved(messages, self.stream.design.sensor_delay_ns)
+            self._waiting.keep(self.stream.waiting.tolist(), delay_ns)
         if self._frame_id:
             messages = [cdr.with_frame(message, self._frame_id) for message in messages]
         messages = cdr.replace_samples(self._type_name, messages, filtered.stamps_ns,
                                        filtered.values, filtered.variance)
         return Processed(messages, _seen(self.stream, samples), filtered.stamps_ns, filtered.values,
-                         np.array([arrival for _, arrival in given], np.int64))
+                         np.array(arrivals_ns, np.int64))
 
     def _count_malformed(self):
         self.malformed += 1
