@@ -4,6 +4,8 @@ The output bag holds the corrected samples on /imu/data, and the raw and referen
 are. Samples that cannot be corrected (the filter's warm-up, bad stamps or values) are counted.
 """
 
+from pathlib import Path
+
 from ..errors import BagError
 from ..io.outputs import say
 from ..io.topics import CORRECTED_TOPIC
@@ -17,6 +19,7 @@ from ._common import (
     add_topics,
     filter_wishes,
     open_bag,
+    printable,
     progress,
     require_report,
     write_json,
@@ -80,6 +83,9 @@ def run(arguments):
     if corrector.batch_size:
         notes.append(f"the samples come {corrector.batch_size:.4g} at a time with one stamp: their "
                      "instants are taken as uniform")
+    found_in = corrector.model.metadata.get("provenance", {}).get("bag")
+    if corrector.model.of_one_record and found_in != printable(Path(arguments.bag).name):
+        notes.append(corrector.model.of_one_record)
     for warning in [*reader.warnings, *notes]:
         print(f"warning: {warning}")
     summary = corrector.design.summary()

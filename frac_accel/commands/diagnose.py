@@ -84,6 +84,8 @@ def run(arguments):
         say(f"{arguments.extended_model}: written" + (
             f"; validate finds that it leaves {validated:.3%} of the whole record's output"
             if validated is not None else ""))
+        if found.model.of_one_record:
+            say(f"{arguments.extended_model}: {found.model.of_one_record}")
     if arguments.report:
         from ..report.diagnosis import diagnosis_page
         page = diagnosis_page(found, source)

@@ -208,6 +208,15 @@ class SensorModel:
         """Whether an effect of some axis depends on the temperature."""
         return any(effect.needs_temperature for axis in self.axes for effect in axis.effects)
 
+    @functools.cached_property
+    def of_one_record(self):
+        """Sentence on the causes that are of one record alone; empty where there is none."""
+        causes = sorted({effect.cause for axis in self.axes for effect in axis.effects
+                         if effect.counts_from_start})
+        it = "them" if len(causes) > 1 else "it"
+        return (f"{', '.join(causes)}: the time counts from the first sample; for another record "
+                f"than the one in which it was found, take {it} out of the model" if causes else "")
+
     @property
     def noise_std(self):
         """Standard deviation of the sensor's white noise [output units]; 0 where not known."""

@@ -58,6 +58,7 @@ class Sensor:
         name, node, model = self.name, self._node, None
         if self.value("model_file"):
             model, self.model_hash = node.load(self.value("model_file"))
+            self._warn(model, self.value("model_file"))
         elif name:
             raise NodeError(f"parameter '{name}.model_file' is missing")
         type_name = self.value("message_type")
@@ -172,6 +173,11 @@ class Sensor:
             topic.replace(model, wishes)
         self._node.get_logger().info(
             f"{topics[0].name}: {model_file} (sha256 {model_hash}) is in use")
+        self._warn(model, model_file)
+
+    def _warn(self, model, model_file):
+        if model.of_one_record:
+            self._node.get_logger().warning(f"{model_file}: {model.of_one_record}")
 
     def _wishes(self, changed=None):
         """What `design_inverse` is asked for, with parameters that are about to change."""

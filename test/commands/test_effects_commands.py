@@ -98,3 +98,24 @@ def test_missing_temperature_is_one_line(bench, tmp_path, capsys, command):
     assert main([command, str(bag), "--model", str(file), "--temperature", "/none", *out]) == 2
     line, = capsys.readouterr().err.strip().splitlines()
     assert "/none" in line
+
+
+def test_correct_says_that_a_step_is_of_another_record(bench, tmp_path, capsys):
+    bag, file, _, _, _ = bench
+    raw, out = tmp_path / "raw.mcap", tmp_path / "c.mcap"
+    steps = [{"cause": "gain_step", "at_s": 2.0, "ratio": 1.1},
+             {"cause": "offset_drift", "rate_per_s": 0.1}]
+
+    def warning_with(effects, provenance=None):
+        model = sensor(effects)
+        if provenance:
+            model.metadata["provenance"] = {"bag": provenance}
+        model.save(file)
+        assert main(["correct", str(raw), "--model", str(file), "-o", str(out)]) == 0
+        return "take them out of the model" in capsys.readouterr().out
+
+    assert main(["simulate", str(bag), "--model", str(file), "-o", str(raw)]) == 0
+    assert warning_with(steps)
+    assert warning_with(steps, provenance="another.mcap")
+    assert not warning_with(steps, provenance="raw.mcap")
+    assert not warning_with([{"cause": "offset", "offset": 0.1}])

@@ -218,6 +218,16 @@ def test_the_console_says_what_is_done_and_what_is_wrong(models):
     assert {"load", "received_per_s", "latency_p99_s"} <= values.keys()
 
 
+def test_a_model_of_one_record_is_named_as_such(models):
+    file = models[0]
+    file.write_text(file.read_text() + "effects: [{cause: gain_step, at_s: 36.9, ratio: 1.2}]\n")
+    with ros_domain() as environment, \
+            NodeProcess("corrector", environment, {"model_file": file}) as node:
+        assert "[WARN]" in node.wait_for(f"{file}: gain_step: the time counts from the first")
+        node.wait_for("corrects /imu/data_raw")
+        assert node.stop() == 0
+
+
 def test_without_a_model_it_says_so():
     with ros_domain() as environment, NodeProcess("corrector", environment) as node:
         assert "[ERROR]" in node.wait_for("no model: set the parameter model_file")

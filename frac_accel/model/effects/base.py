@@ -130,6 +130,8 @@ class Effect:
     nested: ClassVar[tuple[str, ...]] = ()
     # True for what grows along a record, so that a part of it may not show it
     shows_with_time: ClassVar[bool] = False
+    # True for what counts its time from a record's first sample, so that it is of that record alone
+    counts_from_start: ClassVar[bool] = False
     # True for what acts on slow motion, which the strongest part of a record may lack
     acts_on_slow_motion: ClassVar[bool] = False
     # True for what is so common and so cheap to fit that every search begins with it, too

@@ -19,6 +19,7 @@ class GainDrift(Effect):
     stage = GAIN
     explanation = "The sensitivity drifts with time."
     shows_with_time = True
+    counts_from_start = True
     experiment = "Keep level and temperature constant for longer: a drift goes on with time."
 
     rate_per_s: float = parameter("1/s", scale="per_duration", null=0.0)

@@ -17,6 +17,7 @@ class GainStep(Effect):
     stage = GAIN
     explanation = "The sensitivity jumps at one instant."
     shows_with_time = True
+    counts_from_start = True
     experiment = ("Look at cable, supply, range setting and mount for what happened at that "
                   "instant, and repeat before and after handling them.")
 

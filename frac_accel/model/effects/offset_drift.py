@@ -15,6 +15,7 @@ class OffsetDrift(Effect):
     stage = OFFSET
     explanation = "The zero of the output drifts with time."
     shows_with_time = True
+    counts_from_start = True
     experiment = ("Record at rest and at constant temperature for longer: a drifting zero goes on "
                   "with time.")
 

@@ -17,6 +17,7 @@ class OffsetStep(Effect):
     stage = OFFSET
     explanation = "The zero of the output jumps at one instant."
     shows_with_time = True
+    counts_from_start = True
     experiment = ("Look at cable, supply and mount for what happened at that instant, and record "
                   "at rest before and after handling them.")
 

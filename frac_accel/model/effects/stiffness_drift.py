@@ -29,6 +29,7 @@ class StiffnessDrift(Effect):
     stage = CORE
     explanation = "The natural frequency drifts with time, as that of a spring that ages or warms."
     shows_with_time = True
+    counts_from_start = True
     experiment = ("Excite around the resonance at the beginning and at the end of a long record: "
                   "its frequency has moved, and the gain far below it has not.")
 

@@ -20,6 +20,7 @@ class TimeStep(Effect):
     stage = DELAY
     explanation = "The stamps jump against the motion at one instant, as where a clock is set."
     shows_with_time = True
+    counts_from_start = True
     experiment = ("Number the samples at their source, and record a sharp event before and after: "
                   "the numbers go on evenly where the stamps jump.")
 

@@ -21,6 +21,7 @@ class WarmUpDrift(Effect):
     stage = OFFSET
     explanation = "The zero of the output settles after switching on."
     shows_with_time = True
+    counts_from_start = True
     experiment = ("Switch on and record at rest until the zero no longer moves, twice: it settles "
                   "after each start in the same way.")
 
