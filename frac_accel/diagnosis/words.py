@@ -74,16 +74,21 @@ def set_aside(aside, drowned, valid):
 def description_words(described, unnamed, kept, left):
     """Words for what the extended model holds beside named causes: fitted curves, causes that
     were identified with it, and those that are only suspected, with what they leave."""
-    words = ""
+    parts = []
     if described:
-        words = f"; the extended model has {' and '.join(described)}, which describes a part of " \
-                "it and names nothing"
+        parts.append(f"has {_listed(described)}, which describes a part of it and names nothing")
     if unnamed:
-        words += f"; the extended model keeps {' and '.join(unnamed)} without a name"
+        parts.append(f"keeps {_listed(unnamed)} without a name")
     if kept:
-        words += f"; the extended model keeps {' and '.join(kept)}, which describe a part of it " \
-                 f"and are not named: {_percent(left)} of the output is left with them"
-    return words
+        describe, are, them = (("describes", "is", "it") if len(kept) == 1 else
+                               ("describe", "are", "them"))
+        parts.append(f"keeps {_listed(kept)}, which {describe} a part of it and {are} not named: "
+                     f"{_percent(left)} of the output is left with {them}")
+    return "; the extended model " + "; it ".join(parts) if parts else ""
+
+
+def _listed(causes):
+    return " and ".join(causes)
 
 
 def hint_words(share):

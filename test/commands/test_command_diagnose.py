@@ -114,6 +114,7 @@ def test_too_short_a_record_is_insufficient(files, tmp_path, capsys):
     assert "400 samples" in capsys.readouterr().out
 
 
+@pytest.mark.thorough
 def test_extended_model_simulates_the_record(files, tmp_path):
     source, model, case = files("explained")
     extended, simulated = str(tmp_path / "e.yaml"), str(tmp_path / "s.mcap")
@@ -179,6 +180,7 @@ def test_temperature_that_is_no_number(files, tmp_path, capsys):
     assert f"none of {len(stamps)} values is finite" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_temperature_of_part_of_the_record(files, tmp_path):
     """Held at its ends, as slowly as temperatures change."""
     source, model, case = files("explained")

@@ -8,6 +8,7 @@ from frac_accel import Samples, diagnose
 from frac_accel.diagnosis.event import event
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed, cause, knocks", [
     (9100, "sensitivity_error", 1), (9101, "low_pass_lag", 2), (9102, "cross_axis_sensitivity", 1)])
 def test_a_knock_hides_nothing(seed, cause, knocks):

@@ -32,8 +32,7 @@ def strong(seed, quadratic):
     return found, alpha2, alpha3
 
 
-@pytest.mark.parametrize("seed", [3601, pytest.param(3602, marks=pytest.mark.thorough),
-                                  pytest.param(3603, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("seed", [3601, 3602, 3603])
 @pytest.mark.parametrize("quadratic", [1, 0])
 def test_a_strong_spring_is_named_and_leaves_only_noise(seed, quadratic):
     found, alpha2, alpha3 = strong(seed, quadratic)
@@ -47,7 +46,6 @@ def test_a_strong_spring_is_named_and_leaves_only_noise(seed, quadratic):
     assert found.extended["nrmse"] < 0.003
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("quadratic", [1, 0])
 def test_a_motion_that_hardly_repeats_itself_gets_no_other_name(quadratic):
     """So strong that a simulation from a start that is a little off is another motion: a part of

@@ -40,6 +40,7 @@ def slowly_ac_coupled(motion, rate):
     return sosfilt(butter(1, 0.002, "high", fs=rate, output="sos"), motion - 9.81)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("sensor", [ac_coupled, falling, slowly_ac_coupled])
 def test_a_gain_at_standstill_is_no_offset(sensor):
     found = diagnose(pair(1, sensor), SensorModel(Gain(1.0)), time_limit_s=60)
