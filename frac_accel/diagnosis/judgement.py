@@ -590,7 +590,10 @@ def _kept(engine, fitted, widest, after, output):
     error = _rms(p.measured - wider.output, rest)
     better = gain(*errors)
     if not better.is_relevant or engine.hollow(wider) \
-            or max(error, _rms(errors[1], slice(None))) > _CLEARLY * after:
+            or max(error, _rms(errors[1], slice(None))) > _CLEARLY * after \
+            or left_open(engine, wider, engine.uncertainties(wider),
+                         [c for c in wider.effects if c in fitted.effects
+                          and c not in engine.search.base]):
         return None, after, output
     return wider, error, wider.output
 

@@ -30,6 +30,8 @@ _PATH_STEPS = 16
 _FEW_PATH_STEPS = 4
 # With fewer steps the modes of a fractional memory need not be finer.
 _FEW_STEPS = 4
+# Steps of a record up to which what a spring and its path make of the motion is kept.
+_LONG = 1 << 20
 # Frequencies at which links are evaluated at a time.
 _BLOCK = 65536
 # Samples that a response between samples needs after the last one.
@@ -176,6 +178,7 @@ class AxisSimulator:
         self._lag_s = lag_s
         self._convolution, self._room_s = None, 0.0
         self._transfers, self._motions, self._deviations, self._bases = {}, {}, {}, {}
+        self._paths, self._conditioners = {}, {}
         self.circumstances = Circumstances(start_time_s + np.arange(self._n) / self._rate,
                                            _temperature(temperature_c, self._n))
 
@@ -289,16 +292,18 @@ class AxisSimulator:
         if not np.isfinite(deviation[-1]):
             raise FracAccelError("the model's motion grows without bound: its nonlinear terms are "
                                  "too large for this record")
-        for effect in model.path_dependent:
-            passed = motion[0] + deviation
-            deviation = deviation + effect.change_motion(passed, 1 / (self._rate * steps)) - passed
+        path = known_by, force, tuple(model.path_dependent)
+        if model.path_dependent:
+            deviation = _kept_of_short(self._paths, path, _changed_by_path, motion[0], deviation,
+                                       1 / (self._rate * steps), model.path_dependent)
         if self._level:
             start = deviation[0]
         behind = [effect for effect in model.dynamics[1:] if effect.stage >= CORE]
         moving = deviation - start
         filtering = [effect for effect in behind if effect.stage < GAIN]
         if filtering:
-            conditioner = Convolution(moving, self._rate * steps, oversampled=steps > 1)
+            conditioner = _kept_of_short(self._conditioners, path, _behind_core, moving,
+                                         self._rate * steps, steps > 1)
             moving = conditioner.response(_product(filtering, conditioner.s), consumed=True)
         gain = _product([effect for effect in behind if effect.stage >= GAIN], np.array([1j]))
         start *= _static_gain(lambda s: _product(filtering, s)) if start else 0.0
@@ -335,9 +340,29 @@ class AxisSimulator:
         """Convolution with room for a delay."""
         if self._convolution is None or abs(delay_s) > self._room_s:
             self._transfers, self._motions, self._deviations = {}, {}, {}
+            self._paths, self._conditioners = {}, {}
             self._room_s = max(abs(delay_s), 64 / self._rate)
             self._convolution = Convolution(self._moving, self._rate, self._room_s)
         return self._convolution
+
+
+def _kept_of_short(store, key, make, values, *arguments):
+    """What `make` returns, as it was kept where the record is short: a search asks for it often."""
+    if len(values) > _LONG:
+        return make(values, *arguments)
+    return kept(store, key, make, values, *arguments, most=1)
+
+
+def _changed_by_path(linear, deviation, interval_s, effects):
+    """The deviation from a linear motion behind effects that depend on its path."""
+    for effect in effects:
+        passed = linear + deviation
+        deviation = deviation + effect.change_motion(passed, interval_s) - passed
+    return deviation
+
+
+def _behind_core(moving, rate, oversampled):
+    return Convolution(moving, rate, oversampled=oversampled)
 
 
 def _shift(s, delay_s):

@@ -329,10 +329,16 @@ def test_a_failed_command_leaves_no_output_at_all(place, monkeypatch, capsys):
     assert content(place) == before
 
 
+def as_from_a_terminal():
+    """Take in signals, though the tests were started in the background, which ignores some."""
+    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT):
+        signal.signal(number, signal.SIG_DFL)
+
+
 def start(*arguments, **options):
     return subprocess.Popen([sys.executable, "-m", "frac_accel.cli", *arguments], text=True,
                             env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.PIPE,
-                            **options)
+                            preexec_fn=as_from_a_terminal, **options)
 
 
 def wait_for(condition, seconds=60):
@@ -387,7 +393,7 @@ with stopping_cleanly():
     time.sleep(60)
 """
     process = subprocess.run([sys.executable, "-c", script], env=ENVIRONMENT, timeout=50,
-                             capture_output=True, text=True)
+                             capture_output=True, text=True, preexec_fn=as_from_a_terminal)
     assert process.returncode != 0 and "Exception ignored" not in process.stderr
     assert ("KeyboardInterrupt" if number == signal.SIGINT else "Stopped") in process.stderr
 

@@ -46,7 +46,7 @@ def test_a_strong_spring_is_named_and_leaves_only_noise(seed, quadratic):
     assert found.extended["nrmse"] < 0.003
 
 
-@pytest.mark.parametrize("quadratic", [1, 0])
+@pytest.mark.parametrize("quadratic", [1, pytest.param(0, marks=pytest.mark.long)])
 def test_a_motion_that_hardly_repeats_itself_gets_no_other_name(quadratic):
     """So strong that a simulation from a start that is a little off is another motion: a part of
     it may stay without a name, but a resonance was named for it."""
