@@ -57,6 +57,8 @@ _TRIED = 4
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
 
+# a trial that overflows has lost
+@np.errstate(over="ignore", invalid="ignore")
 def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
              temperature: tuple | None = None, reference: str = REFERENCE_TOPIC,
              sensor: str = RAW_TOPIC, progress: Callable | None = None,

@@ -72,7 +72,7 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
     if len(record) > LONG:
         record, used = strongest_part(record, column, used, LONG // 2)
     links = [cause for cause, effect in known_effects().items()
-             if not effect.read_off and not effect.of_reference
+             if not effect.read_off and (not effect.of_reference or effect.acts_on_slow_motion)
              and effect.transfer_function is not Effect.transfer_function]
     own = Engine(record, column, model, used, opened(model), links, limit=limit)
     before = own.search.fit({**own.search.base, **seed})

@@ -48,6 +48,25 @@ def test_ac_coupling_of_a_vertical_axis(seed):
     assert found.verdict == "explained"
 
 
+@pytest.mark.parametrize("seed", [9, 10, 11])
+def test_a_reference_that_has_lost_most_of_the_motion(seed):
+    """Braking and hills are in the sensor alone: an oscillator of no frequency was identified, and
+    stood in the way of all else."""
+    rng, rate = np.random.default_rng(seed), 200.0
+    fast, slow = road(rng, rate, 80, 0.5, 40.0), road(rng, rate, 80, 0.02, 0.2)
+    motion = 0.3 * fast / fast.std() + rng.uniform(1, 3) * slow / slow.std()
+    corner = rng.uniform(0.2, 0.6)
+    recorded = high_passed(motion, FINE * rate, corner)[::FINE]
+    n = len(recorded)
+    found = diagnose(pair(rate, recorded + 0.002 * rng.normal(size=n),
+                          rng.uniform(0.95, 1.05) * motion[::FINE] + rng.normal(size=n) * 0.005,
+                          "x"), time_limit_s=60)
+    cause, = [finding for finding in found.findings if finding.cause != "offset"]
+    assert cause.cause == "reference_ac_coupling"
+    assert cause.effect.corner_hz == pytest.approx(corner, rel=0.02)
+    assert found.verdict == "explained"
+
+
 @pytest.mark.parametrize("seed", [4, 5])
 def test_ac_coupling_that_takes_most_of_the_motion_away(seed):
     """No classical sensor describes a tenth of it, so that the record was refused."""
