@@ -10,6 +10,9 @@ SIGNIFICANT = 3.0
 _REACH = 12
 # Share of a band's noise that a residual shows at least.
 _LEAST = 0.05
+# Widths of the smoothing in which flicker noise is sought, steps of its fit, and log-likelihood
+# that it must gain: chance does that in less than one record of a thousand.
+_FLICKER_REACH, _STEPS, _FLICKER_GAIN = 2, 8, 6.0
 # Share of a residual's power that must be no white noise for it to count as the model's error.
 _BEYOND = 0.2
 # Blocks of a record whose scatter is compared: each is longer than what a residual remembers.
@@ -57,9 +60,8 @@ def sandwich(jacobian, residual, used, room=None):
         part = spectra[:, lines].view(float)
         part[:] = fitted = root.T @ part
         left[lines] = len(residual) - np.einsum("pl,pl->l", fitted, fitted).reshape(-1, 2).sum(1)
-    width = max(5, int(len(power) / np.sqrt(len(used))))
-    power, left = (uniform_filter1d(v, width, mode="reflect") for v in (power, left))
-    smooth = power / np.maximum(left, _LEAST * len(residual))
+    smooth = _smoothed(power, left, max(5, int(len(power) / np.sqrt(len(used)))),
+                       _LEAST * len(residual))
     twice = np.full(len(power), 2.0)
     twice[0] = 1.0
     if length % 2 == 0:
@@ -72,6 +74,47 @@ def sandwich(jacobian, residual, used, room=None):
     strengths, directions = np.linalg.eigh(middle / length)
     root = root @ (directions * np.sqrt(np.maximum(strengths, 0))) / scale[:, None]
     return root @ root.T
+
+
+def _smoothed(power, left, width, least):
+    """Spectrum of the noise from a residual's, over what the fit leaves of each line.
+
+    Smoothed, and at the lowest frequencies with what flicker noise adds: slow columns see most of
+    that, and it falls within a few lines.
+    """
+    wide, fitted = (uniform_filter1d(v, width, mode="reflect") for v in (power, left))
+    smooth = wide / np.maximum(fitted, least)
+    line = np.arange(min(_FLICKER_REACH * width, len(power)))
+    flicker = _flicker(power[line], np.maximum(left[line], least), smooth[line[-1]])
+    smooth[line] = np.maximum(smooth[line], flicker)
+    return smooth
+
+
+def _flicker(power, left, level):
+    r"""Spectrum a + b/k or a + b/k² of the line k from a residual's lowest lines; 0 where b is not
+    significant.
+
+    A line scatters as much as it has on average, so that each step of the fit weighs it by that
+    (maximum likelihood of exponentially distributed lines: P. Whittle, *Ark. Mat.* 2 (1953) 423).
+    The first line, below which a record has none, stands for half a line.
+    """
+    line = np.maximum(np.arange(len(power)), 0.5)
+    best, found = np.inf, np.zeros(len(power))
+    for exponent in (0, 1, 2):
+        laws = np.stack([np.ones(len(line)), line**-exponent], axis=1)[:, :1 + (exponent > 0)]
+        expected = np.full(len(line), level)
+        for _ in range(_STEPS):
+            weights = 1 / (expected * left)
+            rows = laws * (left * weights)[:, None]
+            inverse = np.linalg.pinv(rows.T @ rows)
+            size = np.maximum(inverse @ (rows.T @ (power * weights)), 0.0)
+            expected = np.maximum(laws @ size, _LEAST * level)
+        cost = np.sum(np.log(expected) + power / (expected * left))
+        if exponent == 0:
+            best = cost - _FLICKER_GAIN
+        elif cost < best:
+            best, found = cost, expected
+    return found
 
 
 def spectrum_room(count):
