@@ -130,6 +130,11 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **_as_slow(engine, best, added, takes)}.items():
         doubts.setdefault(cause, words)
     for pair in cancelling(added):
+        # what begins or settles does so from a constant, which may be that of its start or its end
+        of_used = [added[cause][p.used] for cause in pair]
+        if any(best.effects[cause].counts_from_start for cause in pair) \
+                and any(np.allclose(values, values[0]) for values in of_used):
+            continue
         for cause, other in (pair, pair[::-1]):
             doubts.setdefault(cause, f"it nearly cancels {other}: together they may stand for "
                                      "one cause that is not known")
