@@ -21,6 +21,8 @@ from ._common import (
 
 # Share of what is left from which a part of the error budget is told.
 _SHOWN = 0.01
+# Times what the model in use leaves, from which an extended model that leaves more is not written.
+_WORSE = 2.0
 
 EXAMPLES = """
 frac_accel diagnose drive.mcap --model sensor.yaml --report found.html
@@ -78,14 +80,7 @@ def run(arguments):
     result = found.as_dict(arguments.extended_model)
     if arguments.extended_model and found.model is not None:
         found.model.metadata["provenance"] = source
-        found.model.save(arguments.extended_model)
-        validated = _validated(found.model, arguments, reader)
-        result["extended"]["validated_nrmse"] = validated
-        say(f"{arguments.extended_model}: written" + (
-            f"; validate finds that it leaves {validated:.3%} of the whole record's output"
-            if validated is not None else ""))
-        if found.model.of_one_record:
-            say(f"{arguments.extended_model}: {found.model.of_one_record}")
+        result["extended"]["validated_nrmse"] = _write_extended(found, arguments, reader)
     if arguments.report:
         from ..report.diagnosis import diagnosis_page
         page = diagnosis_page(found, source)
@@ -93,6 +88,26 @@ def run(arguments):
         source = page.provenance
         say(f"{arguments.report}: written")
     write_json(arguments.json, {**result, "provenance": source})
+
+
+def _write_extended(found, arguments, reader):
+    """Write the extended model unless it does worse than the one in use; NRMSE of the whole record
+    that `validate` gives of it, or None."""
+    file, model = arguments.extended_model, found.model
+    validated = _validated(model, arguments, reader)
+    in_use = max(found.baseline["nrmse"], found.extended["nrmse"])
+    if validated is not None and validated > _WORSE * in_use:
+        say(f"{file}: not written: simulated from the record's start, the extended model leaves "
+            f"{validated:.3%} of the whole record's output, and the model in use {in_use:.3%} of "
+            "the held-out part's")
+        return validated
+    model.save(file)
+    say(f"{file}: written" + (
+        f"; validate finds that it leaves {validated:.3%} of the whole record's output"
+        if validated is not None else ""))
+    if model.of_one_record:
+        say(f"{file}: {model.of_one_record}")
+    return validated
 
 
 def _validated(model, arguments, reader):

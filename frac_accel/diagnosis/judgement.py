@@ -585,6 +585,9 @@ def _kept(engine, fitted, widest, after, output):
                                                or effect.is_constant or effect.restates_core)}
     if not more or p.limit.ends_judging("what is only suspected was not kept as a description"):
         return None, after, output
+    slow = [effect for effect in {**more, **fitted.effects}.values() if effect.acts_on_slow_motion]
+    if len(slow) > 1:
+        return None, after, output  # they cancel but for a free motion, which no model can have
     wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
     errors = [(p.measured - engine.learnt(fit).output)[rest] for fit in (fitted, wider)]
     error = _rms(p.measured - wider.output, rest)

@@ -88,7 +88,7 @@ def description_words(described, unnamed, kept, left):
 
 
 def _listed(causes):
-    return " and ".join(causes)
+    return " and ".join([*filter(None, [", ".join(causes[:-1])]), causes[-1]])
 
 
 def hint_words(share):

@@ -7,7 +7,10 @@ from ..model import AXES, AxisModel
 from ..model.core import Gain
 from ..record import Record
 from ..signals.convolution import Convolution
-from ..simulation import simulate, static_gain
+from ..simulation import AxisSimulator, simulate, static_gain
+
+# Share of the larger of two answers from which the smaller one is seen.
+_SEEN = 1e-6
 
 
 def restored(reference, sensor, model, axis="x", temperature_at=None):
@@ -48,16 +51,24 @@ def restored(reference, sensor, model, axis="x", temperature_at=None):
         convolution = Convolution(recorded - recorded[0], rate)
         values[:, i] = convolution.response(links.transfer_function(convolution.s)) + recorded[0]
     early_s = -sum(fault.pure_delay_s() for fault in model.reference_faults)
-    gain = static_gain(model.axis(axis))
-    if gain and any(pole == 0 for fault in model.reference_faults for pole in fault.poles()):
+    if any(pole == 0 for fault in model.reference_faults for pole in fault.poles()):
         celsius = temperature_at(pair.start_ns + np.round(1e9 * time)) if temperature_at else None
         output = simulate(model, values, rate, initial="steady", temperature_c=celsius,
                           start_time_s=pair.start_time_s)[:, column]
         # the sensor's instants are later than the restored reference's
         output = np.interp(time + pair.lag_s + early_s, time, output)
         drift = np.stack([np.ones(len(time)), time / time[-1]], axis=1)
-        lost = np.linalg.lstsq(drift[pair.valid], (pair.sensor[:, column] - output)[pair.valid],
-                               rcond=None)[0]
-        values[:, column] += drift @ lost / gain
+        answers = _answers(model.axis(axis), drift, rate)
+        lost = np.linalg.lstsq(answers[pair.valid], (pair.sensor[:, column] - output)[pair.valid],
+                               rcond=_SEEN)[0]
+        values[:, column] += drift @ lost
     stamps = pair.start_ns + np.round(1e9 * (time - early_s)).astype(np.int64)
     return Samples.of(stamps, values, frame_id=reference.frame_id)
+
+
+def _answers(own, drift, rate):
+    """What a sensor makes of a drift, shape (n, 2)."""
+    gain = static_gain(own)
+    if gain:
+        return gain * drift
+    return np.stack([AxisSimulator(each, rate).respond(own) for each in drift.T], axis=1)
