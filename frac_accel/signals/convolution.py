@@ -146,7 +146,9 @@ def _turned(values):
     Where it has power, its response is a wrong one; the fewer they are, the farther it rings.
     """
     n = len(values)
-    power = np.square(np.abs(rfft((values - np.mean(values)) * np.hanning(n))))
+    # of a length with a large prime factor, the transform takes four times as long
+    power = np.square(np.abs(rfft((values - np.mean(values)) * np.hanning(n),
+                                  next_fast_len(n, real=True))))
     above = np.cumsum(power[::-1])
 
     def error(share):
