@@ -117,7 +117,8 @@ class Fitted:
     effects = property(lambda self: self.point.effects)
     cost = property(lambda self: self.point.cost)
     simulated = property(lambda self: self.whole.simulated)
-    output = property(lambda self: self.whole.columns.added(self.simulated, self.whole.left))
+    output = property(lambda self: self.whole.columns.add_to(self.simulated.copy(),
+                                                            self.whole.left))
     free = property(lambda self: self.whole.free)
     residual = property(lambda self: self.whole.residual)
 
@@ -347,7 +348,7 @@ class Problem:
     def clear(self, values, free):
         """Values where they count, without the free motions; shape (n,) or (n, p)."""
         masked = values * (self.used if values.ndim == 1 else self.used[:, None])
-        return free.added(masked, -free.products(masked))
+        return free.add_to(masked, -free.products(masked))
 
     def taken(self, values):
         """Values of the record as they are simulated: all of them."""
@@ -507,7 +508,7 @@ class Problem:
         free, back = columns.orthonormal(self.used)
         error = (self.measured - simulated) * self.used
         components = free.products(error)
-        residual = free.added(error, -components)
+        residual = free.add_to(error, -components)
         return Point(effects, simulated, columns, free, back @ components, residual,
                      float(residual @ residual))
 
@@ -564,7 +565,8 @@ class Problem:
                     continue
                 free = self.free_columns(new)
                 if free is not point.columns and free.count == point.columns.count:
-                    change = point.columns.added(free.added(change, point.left), -point.left)
+                    change = free.add_to(change.copy(), point.left)
+                    point.columns.add_to(change, -point.left)
                 sides.append((moved[i] - theta[i], change))
                 if not unknown.jumps:
                     break

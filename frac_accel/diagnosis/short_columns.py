@@ -53,9 +53,9 @@ class ShortColumns(NamedTuple):
         """Products with values, shape (n,) or (n, p), as (m,) or (m, p)."""
         return np.concatenate([own.T @ values[rows] for rows, own in self.blocks])
 
-    def added(self, values, shares):
-        """Values, shape (n,) or (n, p), and the sum of the columns by their shares."""
-        values, first = values.copy(), 0
+    def add_to(self, values, shares):
+        """Values, shape (n,) or (n, p), with the sum of the columns by their shares: in place."""
+        first = 0
         for rows, own in self.blocks:
             values[rows] += own @ shares[first:first + own.shape[1]]
             first += own.shape[1]

@@ -11,7 +11,7 @@ from ..model import AXES, SensorModel
 from ..model.core import Arx
 from ..model.effects.base import CORE, GAIN, Circumstances
 from ..record.sources import is_bag
-from ..signals.convolution import Convolution, at_positions
+from ..signals.convolution import Convolution, at_positions, exponentials
 from ..signals.kept import kept
 from .modes import modes_of
 
@@ -249,7 +249,8 @@ class AxisSimulator:
         convolution = self._prepared(delay_s)
         transfer = self._transfer(model.dynamics)
         if delay_s:
-            transfer = transfer * kept(self._transfers, delay_s, _shift, convolution.s, delay_s)
+            s = convolution.s
+            transfer = transfer * exponentials(-s[0] * delay_s, -(s[1] - s[0]) * delay_s, len(s))
         if ratio == 1:
             return convolution.response(transfer) + level
         position = ratio * np.arange(self._n)
@@ -338,10 +339,6 @@ class AxisSimulator:
             self._room_s = max(abs(delay_s), 64 / self._rate)
             self._convolution = Convolution(self._moving, self._rate, self._room_s)
         return self._convolution
-
-
-def _shift(s, delay_s):
-    return np.exp(-s * delay_s)
 
 
 def static_gain(model):

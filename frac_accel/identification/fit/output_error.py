@@ -8,7 +8,7 @@ import numpy as np
 from scipy.fft import rfft
 
 from ...errors import IdentificationError
-from ...signals.convolution import Convolution
+from ...signals.convolution import Convolution, exponentials
 from ...signals.kept import kept
 from ...signals.normal_equations import solve
 from ..response.excitation import strongest_stretch
@@ -385,12 +385,12 @@ class _Problem:
         # as many from the record's start
         count = round(self.instants[:last][-1] * self.rate) + 1
         judged = self.judged if isinstance(self.judged, slice) else self.judged[:count]
-        return _exponential(0.0, pole / self.rate, count)[judged]
+        return exponentials(0.0, pole / self.rate, count)[judged]
 
     def transfers(self, own, delay):
         """Responses that give the simulated output, and its derivatives by `own`, as a list."""
         s = self.convolution.s
-        turn = _exponential(-s[0] * delay, -(s[1] - s[0]) * delay, len(s))
+        turn = exponentials(-s[0] * delay, -(s[1] - s[0]) * delay, len(s))
         found = [np.empty(len(s), complex) for _ in range(len(own) + 1)]
         for lines, prepared in zip(self.blocks, self.prepared):
             response, slopes = self.structure.gradient(prepared, own)
@@ -675,13 +675,6 @@ class _AveragedResponse:
         rows[:, 1:] *= gain[:, None, None]
         return (np.einsum("mf,mf->m", error, error), rows @ rows.transpose(0, 2, 1),
                 np.einsum("mpf,mf->mp", rows, error))
-
-
-def _exponential(first, step, count):
-    """exp(first + step k), k = 0 ... count - 1, as products of few exponentials."""
-    inner = int(np.sqrt(count)) + 1
-    outer = np.exp(first + step * inner * np.arange(-(-count // inner)))
-    return np.outer(outer, np.exp(step * np.arange(inner))).ravel()[:count]
 
 
 def _real(values):
