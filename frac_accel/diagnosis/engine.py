@@ -161,6 +161,7 @@ class Engine:
         Only what takes time to show is added, and in a sweep what acts on slow motion.
         """
         p, known = self.problem, self._beside_base(effects)
+        self.part.problem.let_go()
         reference, rows = p.record.reference[:, p.axis], p.strongest(LONG // 2)
         sweeps = is_new(reference[rows], np.delete(reference, rows))
         self.search.candidates = [cause for cause in self.search.candidates

@@ -15,6 +15,7 @@ from ..model.effects.base import CORE, CROSS_AXIS, GAIN, Effect
 from ..model.parameters import Scales, fixed_values, parameter_fields
 from ..signals.kept import kept
 from ..simulation import EDGE, AxisSimulator
+from .short_columns import ShortColumns
 from .time_limit import TimeLimit
 
 # Iterations of a fit, and steps that are tried in each.
@@ -57,7 +58,7 @@ class Point(NamedTuple):
     effects : dict of str to Effect
     simulated : ndarray, shape (n,)
         Output with them, without what the time before the record may have left.
-    columns, free : ndarray, shape (n, m)
+    columns, free : ShortColumns, shape (n, m)
         Free motions that this may be, and an orthonormal basis of them where samples count.
     left : ndarray, shape (m,)
         Size of each column in the record.
@@ -69,8 +70,8 @@ class Point(NamedTuple):
 
     effects: dict
     simulated: np.ndarray
-    columns: np.ndarray
-    free: np.ndarray
+    columns: ShortColumns
+    free: ShortColumns
     left: np.ndarray | None
     residual: np.ndarray
     cost: float
@@ -116,7 +117,8 @@ class Fitted:
     effects = property(lambda self: self.point.effects)
     cost = property(lambda self: self.point.cost)
     simulated = property(lambda self: self.whole.simulated)
-    output = property(lambda self: self.simulated + self.whole.columns @ self.whole.left)
+    output = property(lambda self: self.whole.columns.add_to(self.simulated.copy(),
+                                                            self.whole.left))
     free = property(lambda self: self.whole.free)
     residual = property(lambda self: self.whole.residual)
 
@@ -181,10 +183,14 @@ class Problem:
         self.used = used.copy()
         self.edge = min(EDGE, len(record) // 16)
         self.used[:self.edge] = self.used[len(record) - self.edge:] = False
+        self.calls = 0
+        self.let_go()
+
+    def let_go(self):
+        """Keep nothing that has been simulated; it is made again when asked for."""
         self._simulators = {}
         self._last, self._moved, self._others = (None, None), (None, None), {}
         self._columns = {}
-        self.calls = 0
 
     @property
     def count(self):
@@ -291,7 +297,7 @@ class Problem:
         return self._last[1]
 
     def free_columns(self, effects):
-        """What the time before the record may have left, shape (n, m)."""
+        """What the time before the record may have left, as `ShortColumns`."""
         model = self.axis_model(effects)
         return kept(self._columns, model.dynamics, self._free_columns, model, most=2)
 
@@ -310,16 +316,16 @@ class Problem:
         if getattr(core, "damping_order", 1.0) != 1.0:
             rates = tail_rates(core.natural_frequency_hz, self.time[-1])
         decays = self._decays([*(-rate + 0j for rate in rates), *poles])
-        return np.c_[decays, np.array(lost).T] if lost else decays
+        return ShortColumns.of(np.c_[decays, np.array(lost).T] if lost else decays)
 
     def own_motions(self, effect):
-        """Orthonormal columns, shape (n, m): slow motions that a cause of its own may have left."""
+        """Orthonormal `ShortColumns`: slow motions that a cause of its own may have left."""
         slow = [pole for pole in np.atleast_1d(effect.poles())
                 if -pole.real * EDGE < self.rate]
         columns = self._decays([pole for pole in slow if pole != 0])
         if any(pole == 0 for pole in slow):
             columns = np.c_[columns, np.ones(len(columns)), self.time]
-        return _span(columns, self.used)[0]
+        return ShortColumns.of(columns).orthonormal(self.used)[0]
 
     def _decays(self, poles):
         columns = []
@@ -342,7 +348,7 @@ class Problem:
     def clear(self, values, free):
         """Values where they count, without the free motions; shape (n,) or (n, p)."""
         masked = values * (self.used if values.ndim == 1 else self.used[:, None])
-        return masked - free @ (free.T @ masked)
+        return free.add_to(masked, -free.products(masked))
 
     def taken(self, values):
         """Values of the record as they are simulated: all of them."""
@@ -499,10 +505,10 @@ class Problem:
         simulated = self.simulate(effects, steps=_STEPS_OF_SLOPES if rough else _STEPS)
         self._require_bound(simulated)
         columns = self.free_columns(effects)
-        free, back = _span(columns, self.used)
+        free, back = columns.orthonormal(self.used)
         error = (self.measured - simulated) * self.used
-        components = free.T @ error
-        residual = error - free @ components
+        components = free.products(error)
+        residual = free.add_to(error, -components)
         return Point(effects, simulated, columns, free, back @ components, residual,
                      float(residual @ residual))
 
@@ -558,8 +564,9 @@ class Problem:
                 except FracAccelError:
                     continue
                 free = self.free_columns(new)
-                if free is not point.columns and free.shape == point.columns.shape:
-                    change = change + (free - point.columns) @ point.left
+                if free is not point.columns and free.count == point.columns.count:
+                    change = free.add_to(change.copy(), point.left)
+                    point.columns.add_to(change, -point.left)
                 sides.append((moved[i] - theta[i], change))
                 if not unknown.jumps:
                     break
@@ -655,20 +662,6 @@ class Problem:
     def excited(self):
         """By axis, whether the reference moves along it."""
         return {name: bool(np.ptp(self.record.reference[:, i])) for i, name in enumerate(AXES)}
-
-
-def _span(columns, used):
-    """Orthonormal columns that span the same space where samples count (elsewhere they are zero),
-    and what makes components of the given columns of theirs."""
-    # free motions are short: the rows without any would take most of the time and memory
-    rows = np.flatnonzero(used & columns.any(axis=1))
-    if not len(rows):
-        return np.zeros((len(columns), 0)), np.zeros((columns.shape[1], 0))
-    vectors, sizes, turned = np.linalg.svd(columns[rows], full_matrices=False)
-    count = int(np.sum(sizes > 1e-6 * sizes[0]))
-    spanned = np.zeros((len(columns), count))
-    spanned[rows] = vectors[:, :count]
-    return spanned, turned[:count].T / sizes[:count]
 
 
 def acts_on_spring(effect):

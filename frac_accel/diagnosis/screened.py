@@ -97,7 +97,7 @@ def screen_of(engine):
     """`Screen` of the model in use on an engine's record."""
     search, used = engine.search, engine.problem.used
     fitted = search.baseline
-    taken = _orthonormal(np.hstack([fitted.free[used], fitted.jacobian[used]]))
+    taken = _orthonormal(np.hstack([fitted.free.whole()[used], fitted.jacobian[used]]))
     view = search.view(fitted)
     found = {}
     for cause in search.candidates:

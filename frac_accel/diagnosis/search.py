@@ -286,7 +286,7 @@ class Search:
             return self.screens[fitted.causes]
         view, found = self.view(fitted), []
         rows, share = self._screened_rows()
-        known = _orthonormal(np.hstack([fitted.free[rows], fitted.jacobian[rows]]))
+        known = _orthonormal(np.hstack([fitted.free.whole()[rows], fitted.jacobian[rows]]))
         for place, cause in enumerate(self.candidates):
             self.stages.within(place / len(self.candidates))
             if cause in fitted.effects:
@@ -371,7 +371,7 @@ class Search:
         if start.kind == "whole":
             cost = p.cost(self._joined(fitted.effects, start, start.effect), rough=True)
             return (cost, cause, start.effect) if cost < fitted.cost else None
-        slow = _orthonormal(p.own_motions(start.effect)[rows])
+        slow = _orthonormal(p.own_motions(start.effect).whole()[rows])
         own = _orthonormal(slow - known @ (known.T @ slow))
         known = np.hstack([known, own])
         residual = fitted.residual[rows]

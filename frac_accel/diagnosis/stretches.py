@@ -3,10 +3,10 @@
 import dataclasses
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from ..identification.response.excitation import strongest_stretch
 from .problem import Problem
+from .short_columns import ShortColumns
 
 # Samples from which on a record is seen by stretches, of each stretch, and how many there are.
 MOST = 120_000
@@ -54,6 +54,7 @@ class Stretches(Problem):
 
     def __init__(self, record, axis, baseline, used, limit, slices, in_own_core=()):
         self.slices, self._whole, self._dated = slices, (record, used), {}
+        self.parts = []
         super().__init__(_joined(record, slices), axis, baseline, self.taken(used), limit,
                          in_own_core)
         self.parts = [Problem(record.part(rows), axis, baseline, used[rows], self.limit,
@@ -110,13 +111,19 @@ class Stretches(Problem):
         """As `Problem.change`, stretch by stretch."""
         return np.concatenate([part.change(effects, cause, effect) for part in self.parts])
 
+    def let_go(self):
+        """As `Problem.let_go`."""
+        super().let_go()
+        for part in self.parts:
+            part.let_go()
+
     def _free_columns(self, model):
         # what was before each stretch has left its own
-        return block_diag(*(part._free_columns(model) for part in self.parts))
+        return ShortColumns.in_turn([part._free_columns(model) for part in self.parts])
 
     def own_motions(self, effect):
         """As `Problem.own_motions`, with columns of its own for each stretch."""
-        return block_diag(*(part.own_motions(effect) for part in self.parts))
+        return ShortColumns.in_turn([part.own_motions(effect) for part in self.parts])
 
     def response(self, axis):
         """As `Problem.response`, stretch by stretch."""

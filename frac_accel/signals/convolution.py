@@ -3,8 +3,6 @@
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
-from .kept import kept
-
 # Fall of the damped kernel over one period of the transform: what wraps around is below 1e-8
 # of the response, and undoing the damping over half the period costs four of sixteen digits. A
 # shorter period lets what rings ahead of full-band input come back, thirty times larger at 1.5.
@@ -19,8 +17,6 @@ _PERIOD = 2
 _TURNED = 0.2, 0.1, 0.05, 0.02, 0.01, 0.005
 _FADED, _SHORT = 30.0, 12.0
 _RINGS = 0.33
-# Undamping factors that are kept.
-_UNDAMPINGS = 4
 _LAGRANGE_POINTS = 8
 
 
@@ -54,7 +50,7 @@ class Convolution:
         self._sigma = _DAMPING / self._length
         damping = np.exp(-self._sigma * np.arange(self._n))
         self._spectrum = rfft(values * damping, self._length)
-        self._undamping = {(1, self._n): np.divide(1, damping, out=damping)}
+        self._undamping = np.divide(1, damping, out=damping)
         # (sigma + 2j pi k / length) rate, in place
         self._s = 2j * np.pi * np.arange(self._length // 2 + 1)
         self._s /= self._length
@@ -80,7 +76,7 @@ class Convolution:
         last = transfer[-1:].copy()
         spectrum = np.multiply(self._spectrum, transfer, out=transfer if consumed else None)
         self._smooth_at_nyquist(spectrum, last)
-        return irfft(spectrum, self._length)[:self._n] * self._undamped(1, self._n)
+        return irfft(spectrum, self._length)[:self._n] * self._undamping
 
     def response_between(self, transfer, factor, count):
         """Response at `factor` times the rate, shape (count,); `count` may exceed the input's end.
@@ -90,7 +86,8 @@ class Convolution:
         spectrum = self._spectrum * transfer
         spectrum[-1] /= 2
         values = irfft(spectrum, factor * self._length)[:count]
-        values *= self._undamped(factor, count)
+        values *= exponentials(0.0, self._sigma / factor, count)
+        values *= factor
         return values
 
     def _smooth_at_nyquist(self, spectrum, last):
@@ -104,10 +101,12 @@ class Convolution:
         turn = (angle - np.round(angle / np.pi) * np.pi) * self._ramp
         spectrum[..., -len(self._ramp):] *= np.cos(turn) - 1j * np.sin(turn)
 
-    def _undamped(self, factor, count):
-        # a clock that runs differently needs another count each time
-        return kept(self._undamping, (factor, count), lambda: factor * np.exp(
-            self._sigma / factor * np.arange(count)), most=_UNDAMPINGS)
+
+def exponentials(first, step, count):
+    """exp(first + step k), k = 0 ... count - 1, as products of few exponentials."""
+    inner = int(np.sqrt(count)) + 1
+    outer = np.exp(first + step * inner * np.arange(-(-count // inner)))
+    return np.outer(outer, np.exp(step * np.arange(inner))).ravel()[:count]
 
 
 def at_positions(values, position):
@@ -146,7 +145,9 @@ def _turned(values):
     Where it has power, its response is a wrong one; the fewer they are, the farther it rings.
     """
     n = len(values)
-    power = np.square(np.abs(rfft((values - np.mean(values)) * np.hanning(n))))
+    # of a length with a large prime factor, the transform takes four times as long
+    power = np.square(np.abs(rfft((values - np.mean(values)) * np.hanning(n),
+                                  next_fast_len(n, real=True))))
     above = np.cumsum(power[::-1])
 
     def error(share):

@@ -11,7 +11,7 @@ from ..model import AXES, SensorModel
 from ..model.core import Arx
 from ..model.effects.base import CORE, GAIN, Circumstances
 from ..record.sources import is_bag
-from ..signals.convolution import Convolution, at_positions
+from ..signals.convolution import Convolution, at_positions, exponentials
 from ..signals.kept import kept
 from .modes import modes_of
 
@@ -252,7 +252,8 @@ class AxisSimulator:
         convolution = self._prepared(delay_s)
         transfer = self._transfer(model.dynamics)
         if delay_s:
-            transfer = transfer * kept(self._transfers, delay_s, _shift, convolution.s, delay_s)
+            s = convolution.s
+            transfer = transfer * exponentials(-s[0] * delay_s, -(s[1] - s[0]) * delay_s, len(s))
         if ratio == 1:
             return convolution.response(transfer) + level
         position = ratio * np.arange(self._n)
@@ -363,10 +364,6 @@ def _changed_by_path(linear, deviation, interval_s, effects):
 
 def _behind_core(moving, rate, oversampled):
     return Convolution(moving, rate, oversampled=oversampled)
-
-
-def _shift(s, delay_s):
-    return np.exp(-s * delay_s)
 
 
 def static_gain(model):

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.fft import rfft
 
 from ...errors import IdentificationError
-from ...signals.convolution import Convolution
+from ...signals.convolution import Convolution, exponentials
 from ...signals.kept import kept
 from ...signals.normal_equations import solve
 from ..response.excitation import strongest_stretch
@@ -32,8 +32,8 @@ _HOPELESS = 1.5
 # of it: that it was not much larger than the output.
 _FAINT = 1e-3
 _OVER = -20.0
-# Logarithm of the share of it that is nothing beside any number.
-_NOTHING = -700.0
+# Logarithm of the share of it that is nothing beside any of its first amplitude.
+_NOTHING = -60.0
 # Energy, in variances of the noise, of a free motion that noise alone may show: the largest of a
 # spectrum of 1e5 lines has 23.
 _FEIGNED = 50.0
@@ -79,7 +79,8 @@ class Fit:
     at_bounds : tuple of str
         The structure's parameters with which it ended at a bound of the search.
     gradient : ndarray, shape (p - 1, n), or None
-        Derivatives of the output by all parameters but the offset; 0 where not judged.
+        Derivatives of the output by all parameters but the offset; 0 where not judged. Of single
+        precision: they are kept, and only tell what no residual can show.
     free_share : float
         Power of the free swing that began before the record, of the output's.
     fastest_decay : float
@@ -342,17 +343,19 @@ class _Problem:
         # with room for what `result` may add; what is never written to takes no memory
         room = np.zeros((count + len(slopes) + 3, self.width))
         rows = room[:-2, :len(self.sensor)]
+        # first, so that no other row is there yet while all transfer functions are
+        for place in range(count, len(rows) - 1):
+            self.respond(slopes.pop(0), rows[place])
+        # the derivative of a delay by one sample
+        self.respond(transfer * self.convolution.s * (-1 / self.rate), rows[-1])
+        self.respond(transfer, rows[0])
+        del transfer
         rows[1] = 1.0
         if rings:
             rows[2, :len(swing)], rows[3, :len(swing)] = swing.real, swing.imag
         for row, rate in zip(rows[2 + 2 * rings:count], decays):
             last = np.searchsorted(self.instants, _NOTHING / rate)
             np.exp(rate * self.instants[:last], out=row[:last])
-        for place in range(count, len(rows) - 1):
-            self.respond(slopes.pop(0), rows[place])
-        # the derivative of a delay by one sample
-        self.respond(transfer * self.convolution.s * (-1 / self.rate), rows[-1])
-        self.respond(transfer, rows[0])
         known = rows[:count]
         # what was over before the first used sample fades out of the fit instead of dropping out
         faint = np.diag(np.r_[0.0, 0.0, np.full(count - 2, _FAINT**2)])
@@ -382,12 +385,12 @@ class _Problem:
         # as many from the record's start
         count = round(self.instants[:last][-1] * self.rate) + 1
         judged = self.judged if isinstance(self.judged, slice) else self.judged[:count]
-        return _exponential(0.0, pole / self.rate, count)[judged]
+        return exponentials(0.0, pole / self.rate, count)[judged]
 
     def transfers(self, own, delay):
         """Responses that give the simulated output, and its derivatives by `own`, as a list."""
         s = self.convolution.s
-        turn = _exponential(-s[0] * delay, -(s[1] - s[0]) * delay, len(s))
+        turn = exponentials(-s[0] * delay, -(s[1] - s[0]) * delay, len(s))
         found = [np.empty(len(s), complex) for _ in range(len(own) + 1)]
         for lines, prepared in zip(self.blocks, self.prepared):
             response, slopes = self.structure.gradient(prepared, own)
@@ -528,7 +531,7 @@ class _Problem:
             jacobian[count:-1] = np.linalg.inv(factors.T) @ jacobian[count:-1]
             jacobian[-1] *= self.rate
             # sensitivity, structure, delay, offset, free motions
-            gradient = np.zeros((1 + len(jacobian) - count, self.n))
+            gradient = np.zeros((1 + len(jacobian) - count, self.n), np.float32)
             for row, place in zip(gradient, (0, *range(count, len(jacobian)))):
                 row[self.judged] = jacobian[place]
             order = [0, *(count + np.flatnonzero(~held)), *range(1, count)]
@@ -672,13 +675,6 @@ class _AveragedResponse:
         rows[:, 1:] *= gain[:, None, None]
         return (np.einsum("mf,mf->m", error, error), rows @ rows.transpose(0, 2, 1),
                 np.einsum("mpf,mf->mp", rows, error))
-
-
-def _exponential(first, step, count):
-    """exp(first + step k), k = 0 ... count - 1, as products of few exponentials."""
-    inner = int(np.sqrt(count)) + 1
-    outer = np.exp(first + step * inner * np.arange(-(-count // inner)))
-    return np.outer(outer, np.exp(step * np.arange(inner))).ravel()[:count]
 
 
 def _real(values):

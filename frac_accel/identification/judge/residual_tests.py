@@ -220,7 +220,7 @@ def _moments(error, reference, used, lags, gradient, noise):
     """
     n = len(error)
     denominator, variance = noise
-    others = [np.ones(n), *([] if gradient is None else gradient)]
+    others = [np.ones(n), *(row.astype(float) for row in ([] if gradient is None else gradient))]
     edges = _edges(used)
     if len(edges) == 2:
         stretch = _Stretch(error, reference, edges, lags, others)

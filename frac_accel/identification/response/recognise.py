@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.fft import ifft, irfft, next_fast_len, rfft
+from scipy.fft import irfft, next_fast_len, rfft
 
 # Blocks of the record in which the phase of a sine is followed, and the fewest that make a tone.
 _BLOCKS = 1024
@@ -123,10 +123,10 @@ def _one_short_event(moving):
 
 def _analytic(values, length):
     """Values with their Hilbert transform as imaginary part."""
-    spectrum = np.zeros(length, complex)
-    spectrum[:length // 2 + 1] = rfft(values, length)
-    spectrum[1:(length + 1) // 2] *= 2
-    return ifft(spectrum, overwrite_x=True)
+    analytic = np.empty(len(values), complex)
+    # as real transforms: what one of complex numbers prepares stays in memory
+    analytic.real, analytic.imag = values, irfft(-1j * rfft(values, length), length)[:len(values)]
+    return analytic
 
 
 def _tones(moving, rate):
@@ -135,7 +135,7 @@ def _tones(moving, rate):
     None where they hold too little of it to matter.
     """
     n = len(moving)
-    analytic = _analytic(moving, next_fast_len(n))[:n]
+    analytic = _analytic(moving, next_fast_len(n))
     size = max(4, n // _BLOCKS)
     count = n // size
     phase = np.unwrap(np.angle(analytic))[:count * size].reshape(count, size).mean(axis=1)

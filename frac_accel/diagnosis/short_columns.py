@@ -1,0 +1,76 @@
+"""Columns that are zero but in a few rows, as motions are that fade away."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import block_diag
+
+# Share of the largest singular value that counts as none.
+_NONE = 1e-6
+
+
+class ShortColumns(NamedTuple):
+    """Columns of shape (n, m) by blocks with rows and columns of their own, zero elsewhere.
+
+    Attributes
+    ----------
+    length : int
+        Number of all rows, n.
+    blocks : list of (ndarray of int, shape (r,); ndarray, shape (r, k))
+        Rows and values.
+    """
+
+    length: int
+    blocks: list
+
+    @classmethod
+    def of(cls, columns):
+        """The same of columns as they are, in one block."""
+        rows = np.flatnonzero(columns.any(axis=1))
+        return cls(len(columns), [(rows, columns[rows])])
+
+    @classmethod
+    def in_turn(cls, parts):
+        """Those of parts of a record that follow each other, each with columns of its own."""
+        begins = np.cumsum([0, *(part.length for part in parts)])
+        return cls(int(begins[-1]), [(begin + rows, values) for begin, part in zip(begins, parts)
+                                     for rows, values in part.blocks])
+
+    @property
+    def count(self):
+        """Number of columns."""
+        return sum(values.shape[1] for _, values in self.blocks)
+
+    def whole(self):
+        """The columns as they are, shape (n, m)."""
+        columns, first = np.zeros((self.length, self.count)), 0
+        for rows, values in self.blocks:
+            columns[rows, first:first + values.shape[1]] = values
+            first += values.shape[1]
+        return columns
+
+    def products(self, values):
+        """Products with values, shape (n,) or (n, p), as (m,) or (m, p)."""
+        return np.concatenate([own.T @ values[rows] for rows, own in self.blocks])
+
+    def add_to(self, values, shares):
+        """Values, shape (n,) or (n, p), with the sum of the columns by their shares: in place."""
+        first = 0
+        for rows, own in self.blocks:
+            values[rows] += own @ shares[first:first + own.shape[1]]
+            first += own.shape[1]
+        return values
+
+    def orthonormal(self, used):
+        """Orthonormal columns that span the same space where samples count (elsewhere they are
+        zero), and what makes components of these columns of theirs, shape (m, k)."""
+        # block by block: of a record's stretches at once, it would take most time and memory
+        parts = []
+        for rows, values in self.blocks:
+            counts = used[rows]
+            parts.append((rows[counts], *np.linalg.svd(values[counts], full_matrices=False)))
+        least = _NONE * max(np.max(sizes, initial=0.0) for _, _, sizes, _ in parts)
+        kept = [(rows, vectors[:, sizes > least], sizes[sizes > least], turned[sizes > least])
+                for rows, vectors, sizes, turned in parts]
+        return (ShortColumns(self.length, [(rows, vectors) for rows, vectors, _, _ in kept]),
+                block_diag(*(turned.T / sizes for _, _, sizes, turned in kept)))
