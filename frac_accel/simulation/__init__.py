@@ -1,5 +1,6 @@
 """Simulation of a sensor model from a sampled reference."""
 
+import copy
 import functools
 from typing import Any
 
@@ -176,9 +177,7 @@ class AxisSimulator:
         self._start_time_s = start_time_s
         self._least_steps = steps_per_sample
         self._lag_s = lag_s
-        self._convolution, self._room_s = None, 0.0
-        self._transfers, self._motions, self._deviations, self._bases = {}, {}, {}, {}
-        self._paths, self._conditioners = {}, {}
+        self._clear()
         self.circumstances = Circumstances(start_time_s + np.arange(self._n) / self._rate,
                                            _temperature(temperature_c, self._n))
 
@@ -239,13 +238,31 @@ class AxisSimulator:
         ratio = axis_model.clock_ratio
         # what the clock is off already at the start is a delay like any other
         delay_s = axis_model.delay_s + late_s - self._lag_s - (ratio - 1) * self._start_time_s
-        result = self._linear(axis_model, delay_s, ratio)
+        if ratio != 1:
+            return kept(self._clocks, ratio, self._on_clock, ratio, most=2)._at(axis_model, delay_s)
+        return self._at(axis_model, delay_s)
+
+    def _on_clock(self, ratio):
+        """Simulator for the same motion at the instants of a clock that runs differently."""
+        position = ratio * np.arange(self._n)
+        count = int(max(position[-1], self._n)) + _BEYOND
+        convolution = self._prepared(0.0)
+        fine = convolution.response_between(1.0, _REFINED, _REFINED * count)
+        other = copy.copy(self)
+        other._clear()
+        other._rate = self._rate / ratio
+        other._moving = at_positions(fine, _REFINED * position)
+        return other
+
+    def _at(self, axis_model, delay_s):
+        """Response with this delay in all."""
+        result = self._linear(axis_model, delay_s)
         force = axis_model.static_force
         if (force or axis_model.path_dependent) and not (self._still and not self._level):
-            result += self._deviation(axis_model, force, delay_s, ratio)
+            result += self._deviation(axis_model, force, delay_s)
         return result
 
-    def _linear(self, model, delay_s, ratio):
+    def _linear(self, model, delay_s):
         level = self._level * static_gain(model) if self._level else 0.0
         if self._still:
             return np.full(self._n, level)
@@ -254,14 +271,9 @@ class AxisSimulator:
         if delay_s:
             s = convolution.s
             transfer = transfer * exponentials(-s[0] * delay_s, -(s[1] - s[0]) * delay_s, len(s))
-        if ratio == 1:
-            return convolution.response(transfer) + level
-        position = ratio * np.arange(self._n)
-        count = int(max(position[-1], self._n)) + _BEYOND
-        fine = convolution.response_between(transfer, _REFINED, _REFINED * count)
-        return at_positions(fine, _REFINED * position) + level
+        return convolution.response(transfer) + level
 
-    def _deviation(self, model, force, delay_s, ratio):
+    def _deviation(self, model, force, delay_s):
         """What the spring's force beyond its linear part adds, and what depends on the path."""
         try:
             from . import nonlinear_motion
@@ -276,7 +288,7 @@ class AxisSimulator:
             wanted = max(wanted, _PATH_STEPS if self._least_steps >= _FEW_STEPS
                          else _FEW_PATH_STEPS)
         steps = int(np.ceil(min(wanted, _MOST_STEPS_PER_SAMPLE)))
-        position = ratio * np.arange(self._n) - delay_s * self._rate
+        position = np.arange(self._n) - delay_s * self._rate
         count = int(max(position[-1], self._n)) + _BEYOND
         self._prepared(delay_s)
         links = (core, *(effect for effect in model.dynamics[1:] if effect.stage < CORE))
@@ -308,7 +320,7 @@ class AxisSimulator:
             moving = conditioner.response(_product(filtering, conditioner.s), consumed=True)
         gain = _product([effect for effect in behind if effect.stage >= GAIN], np.array([1j]))
         start *= _static_gain(lambda s: _product(filtering, s)) if start else 0.0
-        if delay_s or ratio != 1:
+        if delay_s:
             moving = at_positions(moving, steps * position)
         else:
             moving = moving[:steps * self._n:steps]
@@ -337,11 +349,18 @@ class AxisSimulator:
                 kept(self._transfers, link, link.transfer_function, self._convolution.s)
                 for link in links])
 
+    def _clear(self):
+        self._convolution, self._room_s, self._bases, self._clocks = None, 0.0, {}, {}
+        self._forget()
+
+    def _forget(self):
+        self._transfers, self._motions, self._deviations = {}, {}, {}
+        self._paths, self._conditioners = {}, {}
+
     def _prepared(self, delay_s):
         """Convolution with room for a delay."""
         if self._convolution is None or abs(delay_s) > self._room_s:
-            self._transfers, self._motions, self._deviations = {}, {}, {}
-            self._paths, self._conditioners = {}, {}
+            self._forget()
             self._room_s = max(abs(delay_s), 64 / self._rate)
             self._convolution = Convolution(self._moving, self._rate, self._room_s)
         return self._convolution
