@@ -12,6 +12,7 @@ from ..model.effects.base import CROSS_AXIS, OFFSET, Effect
 from .engine import LONG, WEIGHS
 from .names import cancelling, undetermined
 from .problem import Problem, acts_on_spring
+from .search import acts_as_filter
 from .words import AS_NOISE
 
 # Times the odd (even) part of what is left, in RMS, that an odd (even) cause must take.
@@ -216,8 +217,7 @@ def left_open(engine, fitted, stds, causes):
 def _filters(engine, best):
     """Causes that act as linear filters, by cause."""
     return {cause: effect for cause, effect in best.effects.items()
-            if cause not in engine.search.base and not effect.is_constant
-            and (is_link(effect) or effect.pure_delay_s() or effect.restates_core)}
+            if cause not in engine.search.base and acts_as_filter(effect)}
 
 
 def _share_of(engine, fitted, part):

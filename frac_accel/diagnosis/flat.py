@@ -11,6 +11,7 @@ from ..model.effects import Effect, known_effects
 from ..model.parameters import parameter_fields
 from .engine import LONG, Engine
 from .gain import gain
+from .search import acts_as_filter
 from .stretches import strongest_part
 
 # Links that are fitted, and the share of an oscillator's residual power that one may leave: by
@@ -74,9 +75,12 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
     links = [cause for cause, effect in known_effects().items()
              if not effect.read_off and (not effect.of_reference or effect.acts_on_slow_motion)
              and effect.transfer_function is not Effect.transfer_function]
-    own = Engine(record, column, model, used, opened(model), links, limit=limit)
+    clocks = [cause for cause, effect in known_effects().items()
+              if effect.common_to_axes and effect.shows_with_time]
+    own = Engine(record, column, model, used, opened(model), [*links, *clocks], limit=limit)
     before = own.search.fit({**own.search.base, **seed})
-    before = own.search.prune(_with_what_stands_alone(own, before), own.threshold)
+    before = own.search.prune(_with_what_stands_alone(own, _with_clock(own, before, clocks)),
+                              own.threshold)
     beside = {cause: effect for cause, effect in before.effects.items()
               if cause in seed or cause not in own.search.base}
     flat = SensorModel(Gain(model.axes[column].core.sensitivity))
@@ -161,10 +165,24 @@ def _with_a_link(engine, fitted):
     """Fits with one link more, the best first."""
     search = engine.search
     fits = search.fit_all([search.begun(fitted, cause, begin)
-                           for _, cause, begin in search.screen(fitted)[:_FITTED]], fitted.cost)
+                           for _, cause, begin in [entry for entry in search.screen(fitted)
+                                                   if acts_as_filter(entry[2])][:_FITTED]],
+                          fitted.cost)
     # one of another order may be the best, and none needs what the oscillator was identified with
     return sorted((search.prune(search.varied(fit), engine.threshold) for fit in fits),
                   key=lambda fit: fit.cost)
+
+
+def _with_clock(engine, fitted, clocks):
+    """A fit with what a clock does, where that takes most of what is left: what was identified
+    without it tells nothing of the sensor."""
+    search = engine.search
+    for _, cause, begin in search.screen(fitted):
+        if cause in clocks:
+            fit = next(iter(search.fit_all([search.begun(fitted, cause, begin)])), fitted)
+            if fit.cost < _LESS * fitted.cost:
+                return fit
+    return fitted
 
 
 def _with_what_stands_alone(engine, fitted):

@@ -434,8 +434,29 @@ class Search:
                 [effects for cost, _, effects in begun if promises(bare, cost)])]
         if not done(bare):
             seeds.append(self.everyday(bare))
-        return self.prune(self.grow([begin for i, begin in enumerate(seeds) if begin or not i],
-                                    threshold, promises, done, _MOST), threshold)
+        grown = self.grow([begin for i, begin in enumerate(seeds) if begin or not i],
+                          threshold, promises, done, _MOST)
+        return self._with_one_filter(self.prune(grown, threshold))
+
+    def _with_one_filter(self, best):
+        """A set with one filter in place of several, where that describes the record as well.
+
+        Each that joined took the most at its time: a delay, then a resonance for what the delay
+        lacks, and so on, until together they imitate a filter of higher order.
+        """
+        several = {cause for cause, effect in best.effects.items()
+                   if cause not in self.base and acts_as_filter(effect)}
+        if len(several) < 2 or _is_nonlinear(best) or self.problem.limit.ends_search(
+                "one filter in place of several was not tried"):
+            return best
+        rest = self.fit({c: effect for c, effect in best.effects.items() if c not in several})
+        chosen = [(cause, begin) for _, cause, begin in self.screen(rest)
+                  if acts_as_filter(begin)][:_FITS]
+        alone = [self.varied(fit) for fit in
+                 self.fit_all([self.begun(rest, *join) for join in chosen])[:_BEAM]]
+        return min((fit for fit in alone
+                    if fit.cost <= (1 + _TIE / self.problem.count) * best.cost),
+                   key=lambda fit: fit.cost, default=best)
 
     def grow(self, seeds, threshold, promises, done, most):
         """The best set that grows from any of some; `most` is the number of causes to be added."""
@@ -498,6 +519,12 @@ class Search:
             # a filter of another order has another delay
             found = self.varied(found)
         return found
+
+
+def acts_as_filter(effect):
+    """Whether an effect changes different frequencies differently, if only by a delay."""
+    return not effect.is_constant and bool(is_link(effect) or effect.pure_delay_s()
+                                           or effect.restates_core)
 
 
 def _other(core, name):
