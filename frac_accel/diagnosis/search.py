@@ -92,11 +92,15 @@ class Search:
         self.stages = stages or Stages(None, problem.limit)
 
     def fit(self, effects):
-        """Fitted set of causes, from the parameters given unless it is known.
+        """Fitted set of causes, from the parameters given unless it is known; with other orders or
+        kinds of these causes only where that is no worse.
 
         Where its motion is without bound, the best that is known of fewer.
         """
         known = self.fits.get(frozenset(effects))
+        if known is not None and _kinds(known.effects) != _kinds(effects):
+            self._forget_worse(effects)
+            known = self.fits.get(frozenset(effects))
         if known is None or known.rough:
             try:
                 self._keep(self.problem.finished(known) if known else self.problem.fit(effects))
