@@ -483,8 +483,9 @@ def _with_identified(engine, best, fitted, stds):
     effects = fitted.effects.values()
     if any(effect.clock_ratio() != 1 or effect.time_steps() for effect in effects) \
             and not any(delay.cause in (effect.cause, effect.mirrors) for effect in effects):
+        # with the orders of filters that were found without it
         fitted = engine.search.to_its_best(
-            engine.search.fit({delay.cause: delay, **fitted.effects}))
+            engine.search.again({delay.cause: delay, **fitted.effects}))
         stds = engine.uncertainties(fitted)
     more = {cause: effect for cause, effect in common.items() if cause not in fitted.effects
             and (not odd or cause in needed)}
