@@ -9,6 +9,10 @@ from .base import DEAD_ZONE, Effect
 from .fit_starts import positive
 
 
+# Shares of the samples that must lie below zero, and above.
+_BOTH_SIDES = 0.01, 0.99
+
+
 @dataclasses.dataclass(frozen=True)
 class DeadZone(Effect):
     r""":math:`y \to \mathrm{sgn}(y) \max(|y| - w, 0)`."""
@@ -36,4 +40,7 @@ class DeadZone(Effect):
 
     @classmethod
     def starts(cls, view):
+        low, high = np.quantile(view.simulated[view.used], _BOTH_SIDES)
+        if not low < 0 < high:
+            return []  # of a signal that stays on one side it takes a constant, as an offset does
         return [positive(cls(share * view.level), "half_width") for share in (0.01, 0.05, 0.2)]
