@@ -340,7 +340,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         + hidden_words(account.own, account.error) + late,
         {"rmse": account.before, "nrmse": account.before / spread,
          "noise_rms": floor or left.noise_rms},
-        findings, suspects,
+        findings, list({tuple(each["causes"]): each for each in suspects[::-1]}.values())[::-1],
         {"rmse": after, "nrmse": after / spread},
         _by_itself(findings, fitted, floor, fraction) if verdict == "explained"
         else float(min(fraction, 1.0)), model, found,

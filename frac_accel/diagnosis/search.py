@@ -11,6 +11,7 @@ from ..model.core import Oscillator
 from ..model.effects import IDENTIFIED, known_effects
 from ..model.effects.fit_starts import EquationOfMotion
 from ..model.parameters import fixed_values, parameter_fields
+from ..shown import several
 from .problem import acts_on_spring, follows_path
 from .stages import SEARCHED, Stages
 
@@ -468,7 +469,8 @@ class Search:
                       key=lambda fit: fit.cost)
         best = beam[0]
         for added in range(most):
-            if self.problem.limit.ends_search(f"no cause was added to {len(best.causes)}"):
+            if self.problem.limit.ends_search(
+                    f"sets of more than {several(len(best.causes - self.base.keys()), 'cause')} were not tried"):
                 break
             self.stages.enter_round(f"searching for cause {added + 1}", SEARCHED)
             wanted = {}
