@@ -77,7 +77,7 @@ def main(arguments=None):
 
 
 def _run(chosen, module, arguments):
-    from .commands._common import guard_files
+    from .commands._common import guard_files, one_line
     try:
         with stopping_cleanly(), together():
             guard_files(chosen)
@@ -86,7 +86,7 @@ def _run(chosen, module, arguments):
         sys.stdout.flush()
         return status
     except FracAccelError as error:
-        words, status = str(error), 2
+        words, status = one_line(error), 2
     except OSError as error:
         status = 2
         words = ": ".join(str(part) for part in (error.filename, error.strerror or error)

@@ -14,7 +14,7 @@ import sys
 import threading
 from pathlib import Path
 
-from ..errors import BagError, FracAccelError
+from ..errors import BagError, DesignError, FracAccelError
 from ..io.outputs import guard, sweep, write_text
 from ..io.regular_file import open_regular
 from ..io.topics import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC
@@ -27,6 +27,9 @@ BAG_HELP = ".mcap file or rosbag2 folder, or .db3, .csv, .parquet, .mf4, .npz (s
 _NUMBERS = re.compile(r"\[([-+.\deEnul,\s]*)\]")
 # Time [s] after which a bar is drawn anew without a step.
 _TICK_S = 0.5
+# What the options of `add_filter` are called where a library's error names them.
+_OF_WISHES = {"bandwidth_hz": "--bandwidth", "lowest_hz": "--lowest", "max_delay_s": "--max-delay",
+              "tolerance=": "--tolerance "}
 # Options that name files, of all verbs.
 INPUTS = ("bag", "bags", "inputs", "model", "result")
 OUTPUTS = ("output", "extended_model", "report", "json")
@@ -94,12 +97,25 @@ def add_filter(parser):
     parser.add_argument("--max-delay", type=positive, metavar="S",
                         help="permitted delay of the filter (default: at most four periods of the "
                              "highest frequency)")
+    parser.add_argument("--tolerance", type=positive, metavar="SHARE",
+                        help="permitted worst relative error of the filter in its band "
+                             "(default: 0.002)")
 
 
 def filter_wishes(arguments):
     """Those wishes as keywords of `Corrector`."""
-    return {"sampling_rate_hz": arguments.sample_rate or 0.0, "bandwidth_hz": arguments.bandwidth,
-            "lowest_hz": arguments.lowest, "max_delay_s": arguments.max_delay}
+    wishes = {"sampling_rate_hz": arguments.sample_rate or 0.0, "bandwidth_hz": arguments.bandwidth,
+              "lowest_hz": arguments.lowest, "max_delay_s": arguments.max_delay}
+    return wishes if arguments.tolerance is None else {**wishes, "tolerance": arguments.tolerance}
+
+
+def one_line(error):
+    """A library's error as a command says it: of a filter, options in place of keywords."""
+    words = str(error)
+    if isinstance(error, DesignError):
+        for wish, option in _OF_WISHES.items():
+            words = words.replace(f"{wish}=", f"{option} ").replace(wish, option)
+    return " ".join(words.split())
 
 
 def add_json(parser):

@@ -19,6 +19,7 @@ from ..errors import FracAccelError
 from ..fleet.places import at_hand, output_at
 from ..fleet.workers import package_version
 from ..io.outputs import together
+from ._common import one_line
 
 # What a verb writes beside its result.
 _OUTPUTS = {"correct": ".mcap", "identify": ".yaml"}
@@ -63,7 +64,7 @@ def _row(task):
     try:
         told.update(_told(task))
     except FracAccelError as error:
-        told["error"] = " ".join(str(error).split())
+        told["error"] = one_line(error)
         told["is_fatal"] = _is_full(error)
     except MemoryError:
         told["error"] = "there is not enough memory for this bag"

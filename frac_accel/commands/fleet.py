@@ -166,7 +166,7 @@ def _options(arguments):
     defaults = {"reference": REFERENCE_TOPIC, "sensor": RAW_TOPIC, "temperature": TEMPERATURE_TOPIC,
                 "structure": "auto"}
     names = ("reference", "sensor", "temperature", "noise_std", "time_limit", "structure",
-             "sample_rate", "bandwidth", "lowest", "max_delay")
+             "sample_rate", "bandwidth", "lowest", "max_delay", "tolerance")
     line = []
     for name in names:
         value = getattr(arguments, name, None)

@@ -79,7 +79,7 @@ def _told_apart(bags):
 
 
 def _print(result, pairs, bags):
-    from ..report.quantity import left_open_by, written
+    from ..report.quantity import held_out_words, left_open_by, written
     for bag, pair in zip(bags, pairs):
         name = f"{Path(bag).name}: " if len(bags) > 1 else ""
         print(f"{name}{len(pair)} samples at {pair.sampling_rate_hz:.6g} Hz")
@@ -92,8 +92,7 @@ def _print(result, pairs, bags):
         words = "open: these data do not determine it" if name in left_open \
             else written(entry["value"], entry["std"], entry["unit"])
         print(f"  {name:21} {words}")
-    print(f"  residual {result.nrmse:.3%} of the output, {result.held_out_nrmse:.3%} on held-out "
-          "data")
+    print(f"  residual {result.nrmse:.3%} of the output, {held_out_words(result.held_out_nrmse)}")
     if result.validation.records:
         print(_table(result.validation.records))
     for line in result.validation.verdict:

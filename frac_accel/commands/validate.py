@@ -1,6 +1,12 @@
-"""Judge a model on a measured pair: its simulation, and the correction that it gives."""
+"""Judge a model on a measured pair: its simulation, and the correction that it gives.
 
-from ..errors import FracAccelError
+Where no correction can be designed, the simulation is judged alone, and a warning says why.
+"""
+
+import math
+import sys
+
+from ..errors import DesignError, FracAccelError
 from ..io.outputs import say
 from ._common import (
     add_bag,
@@ -11,6 +17,7 @@ from ._common import (
     add_temperature,
     add_topics,
     filter_wishes,
+    one_line,
     open_bag,
     provenance,
     read_temperature_at,
@@ -55,6 +62,8 @@ def run(arguments):
     except FracAccelError as error:
         raise type(error)(f"{arguments.bag}: {error}") from None
     print(table(result, arguments.axis))
+    if result.no_correction:
+        print(f"warning: there is no correction: {_why(result)}", file=sys.stderr)
     for words in result.words:
         print(f"data: {words}")
     if arguments.report:
@@ -66,21 +75,31 @@ def run(arguments):
 def _page(result, model, arguments):
     from ..report.correction import BeforeAfter, correction_page, filter_words
     from ..report.quantity import percent
+    from ..report.signals import sentence
     axis, seen, filters = arguments.axis, result.comparison, result.filters
-    drawn = BeforeAfter(axis, filters["sampling_rate_hz"], seen.stamps_ns, seen.before, seen.after,
-                        seen.std, filters["axes"][axis]["band_hz"], seen.reference)
-    summary = [f"NRMSE {percent(seen.scaled.total.nrmse)} before and "
-               f"{percent(seen.corrected.total.nrmse)} after correction; the simulated output "
-               f"differs from the measured one by {percent(result.simulation.total.nrmse)}.",
-               filter_words(axis, filters)]
+    simulated = ("the simulated output differs from the measured one by "
+                 f"{percent(result.simulation.total.nrmse)}.")
+    metrics = {"simulated against measured output": result.simulation}
+    if seen is None:
+        drawn, summary = [], [sentence(simulated), f"There is no correction: {_why(result)}."]
+    else:
+        drawn = [BeforeAfter(axis, filters["sampling_rate_hz"], seen.stamps_ns, seen.before,
+                             seen.after, seen.std, filters["axes"][axis]["band_hz"],
+                             seen.reference)]
+        summary = [f"NRMSE {percent(seen.scaled.total.nrmse)} before and "
+                   f"{percent(seen.corrected.total.nrmse)} after correction; {simulated}",
+                   filter_words(axis, filters)]
+        metrics |= {"raw / sensitivity against reference": seen.scaled,
+                    "corrected against reference": seen.corrected}
     source = provenance(arguments.bag, f"frac_accel validate {arguments.bag} --model "
                         f"{arguments.model} --reference {arguments.reference} --sensor "
                         f"{arguments.sensor} --axis {axis}")
-    return correction_page(
-        f"Validation, axis {axis}", [drawn], summary, source, model,
-        {"simulated against measured output": result.simulation,
-         "raw / sensitivity against reference": seen.scaled,
-         "corrected against reference": seen.corrected})
+    return correction_page(f"Validation, axis {axis}", drawn, summary, source, model, metrics)
+
+
+def _why(result):
+    """Why there is no correction, in the command's words."""
+    return one_line(DesignError(result.no_correction))
 
 
 def table(result, axis):
@@ -88,9 +107,10 @@ def table(result, axis):
     from ..report.quantity import fixed, short
     signals = [("simulated against measured output"
                 + (", turned into the reference's axes" if result.turned else ""),
-                result.simulation),
-               ("raw / sensitivity against reference", result.comparison.scaled),
-               ("corrected against reference", result.comparison.corrected)]
+                result.simulation)]
+    if result.comparison:
+        signals += [("raw / sensitivity against reference", result.comparison.scaled),
+                    ("corrected against reference", result.comparison.corrected)]
     lines = []
     for title, metrics in signals:
         lines.append(f"{title}, axis {axis}")
@@ -100,9 +120,13 @@ def table(result, axis):
             lines.append(f"  {low:8.4g} .. {high:<8.4g} {fixed(100 * band.nrmse):>9} "
                          f"{fixed(100 * band.amplitude_error):>14} "
                          f"{fixed(band.phase_error_deg):>12} {fixed(100 * band.peak_error):>10}")
-        lines.append(f"  median relative error {metrics.median_relative_error_percent:.3f} %")
+        lines.append(f"  median relative error {fixed(metrics.median_relative_error_percent)} %")
         if metrics is result.simulation:
-            lines.append(f"  at all frequencies: NRMSE {100 * result.whole_nrmse:.3f} %")
+            lines.append(f"  at all frequencies: NRMSE {fixed(100 * result.whole_nrmse)} %")
+        if any(not math.isfinite(band.nrmse) for band in metrics.bands):
+            lines.append("  -: the record is too short to tell, or the reference too quiet there")
+    if not result.comparison:
+        return "\n".join(lines)
     filters, design = result.filters, result.filters["axes"][axis]
     low, high = design["band_hz"]
     delay, own = (short(filters[name], "s") for name in ("filter_delay_s", "sensor_delay_s"))

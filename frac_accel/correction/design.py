@@ -21,6 +21,9 @@ NYQUIST_SHARE = 0.6
 TOLERANCE = 2e-3
 # Without a permitted delay: the shortest whose noise gain is this close to that of a brick wall.
 NOISE_EXCESS = 1.3
+# Bands that are tried where one cannot be met: shares of its upper end, for that and for the lower.
+_NARROWER = (0.7, 0.5, 0.25, 0.1, 0.03)
+_HIGHER = (1e-3, 1e-2, 0.1)
 # Ratio of a band's edges over which a plateau is looked for where the band begins at zero.
 _WIDEST = 1000
 
@@ -147,15 +150,10 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
     ([300.0, 300.0, 300.0], True)
     """
     rate = _positive(sampling_rate_hz, "sampling_rate_hz")
-    for name, value in (("bandwidth_hz", bandwidth_hz), ("max_delay_s", max_delay_s),
-                        ("lowest_hz", lowest_hz), ("tolerance", tolerance)):
-        if value is not None:
-            _positive(value, name)
+    require_wishes(bandwidth_hz, max_delay_s, lowest_hz, tolerance)
     zeros = np.zeros((1, 3))
     model.live_inverse(rate)(zeros, zeros, Circumstances.at_rest(1))  # refuses singular ones
     ratio = _clock_ratio(model)
-    bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz, model.band_hz)
-             for name, axis in zip(AXES, model.axes)]
     # stamps are whole nanoseconds; what is left of the delay is done by the filters
     sensor_delay_ns = int(np.ceil(max(axis.delay_s for axis in model.axes) * 1e9 - 1e-3))
 
@@ -174,9 +172,21 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
     def terms(axis, band):
         return StaticTermsDesign(axis, true_rate, band, late(axis)) if axis.static_force else None
 
-    problems = [problem(axis, band) for axis, band in zip(model.axes, bands)]
+    def within(bandwidth_hz, lowest_hz):
+        bands = [_band(axis, name, rate, bandwidth_hz, lowest_hz, model.band_hz)
+                 for name, axis in zip(AXES, model.axes)]
+        return bands, [problem(axis, band) for axis, band in zip(model.axes, bands)]
+
+    bands, problems = within(bandwidth_hz, lowest_hz)
     nonlinear = [terms(axis, band) for axis, band in zip(model.axes, bands)]
-    delay = _choose_delay(list(dict.fromkeys(problems)), rate, max_delay_s, tolerance)
+
+    def elsewhere():
+        high, low = (pick(band[end] for band in bands) for pick, end in ((max, 1), (min, 0)))
+        yield "bandwidth_hz", high, _NARROWER, lambda end: within(end, lowest_hz)[1]
+        if high * _HIGHER[-1] > low:
+            yield "lowest_hz", high, _HIGHER, lambda end: within(bandwidth_hz, end)[1]
+
+    delay = _choose_delay(list(dict.fromkeys(problems)), rate, max_delay_s, tolerance, elsewhere)
     delay = _delay_with_terms(delay, nonlinear, rate, max_delay_s)
 
     @functools.cache
@@ -189,6 +199,19 @@ def design_inverse(model, sampling_rate_hz, bandwidth_hz=None, max_delay_s=None,
     return FilterDesign(model=model, sampling_rate_hz=rate, axes=axes, static_terms=static_terms,
                         delay_samples=delay, sensor_delay_ns=sensor_delay_ns,
                         parameter_uncertainty=uncertainty, notes=notes)
+
+
+def require_wishes(bandwidth_hz=None, max_delay_s=None, lowest_hz=None, tolerance=None):
+    """Refuse wishes, as those of `design_inverse`, that are no numbers above 0.
+
+    Raises
+    ------
+    FracAccelError
+    """
+    for name, value in (("bandwidth_hz", bandwidth_hz), ("max_delay_s", max_delay_s),
+                        ("lowest_hz", lowest_hz), ("tolerance", tolerance)):
+        if value is not None:
+            _positive(value, name)
 
 
 def _parameter_uncertainty(model, problems, delay, axes):
@@ -276,12 +299,11 @@ def _clock_ratio(model):
     return ratios.pop()
 
 
-def _choose_delay(problems, rate, max_delay_s, tolerance):
-    """Common delay [samples] of all axes."""
+def _choose_delay(problems, rate, max_delay_s, tolerance, elsewhere=lambda: ()):
+    """Common delay [samples] of all axes; `elsewhere` gives other bands, as `_offers` takes them,
+    for where there is none."""
     period = rate / min(problem.band[1] for problem in problems)
-    longest = max(problem.longest for problem in problems)
-    if max_delay_s is not None:
-        longest = min(longest, int(max_delay_s * rate * (1 + 1e-9)))
+    longest = _longest(problems, rate, max_delay_s)
     shares = (0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3, 4, 6, 8)
     usual = 4 * period if max_delay_s is None else longest
     ladder = sorted({min(int(np.ceil(share * period)), longest) for share in shares} | {longest})
@@ -300,34 +322,59 @@ def _choose_delay(problems, rate, max_delay_s, tolerance):
         if max_delay_s is None and excess <= NOISE_EXCESS:
             break
     if best is None:
-        raise DesignError(_cannot(problems, rate, max_delay_s, tolerance, smallest, longest))
+        raise DesignError(_cannot(problems, rate, max_delay_s, tolerance, smallest, elsewhere))
     return best
+
+
+def _longest(problems, rate, max_delay_s):
+    """Longest delay [samples] that is of use and permitted."""
+    longest = max(problem.longest for problem in problems)
+    return longest if max_delay_s is None else min(longest, int(max_delay_s * rate * (1 + 1e-9)))
 
 
 def _worst(designs):
     return max(max(d.amplitude_error, np.radians(d.phase_error_deg)) for d in designs)
 
 
-def _cannot(problems, rate, max_delay_s, tolerance, smallest, longest):
-    """Say what was asked for, and a delay or tolerance with which it can be met."""
+def _cannot(problems, rate, max_delay_s, tolerance, smallest, elsewhere):
+    """Say what was asked for, and a delay, a band or a tolerance with which it can be met."""
     low = min(problem.band[0] for problem in problems)
     high = max(problem.band[1] for problem in problems)
     what = f"a worst error of {tolerance:.2g} from {low:.4g} to {high:.4g} Hz at {rate:.6g} Hz"
     most = max(problem.longest for problem in problems)
+    longest = _longest(problems, rate, max_delay_s)
     delay = longest + 1
     while max_delay_s is not None and delay <= most:
         if _worst([problem.solve(delay, tolerance) for problem in problems]) <= tolerance:
             return (f"{what} needs a delay of {_rounded_up(delay / rate, 6)} s, but max_delay_s is "
                     f"{max_delay_s:.3g} s; there the error is {smallest:.2g}")
         delay = int(np.ceil(1.2 * delay))
+    offers = list(_offers(elsewhere, rate, max_delay_s, tolerance))
     possible = smallest
     while possible < 0.5:
         possible = float(_rounded_up(possible, 2))
         if _worst([problem.solve(longest, possible) for problem in problems]) <= possible:
-            return (f"{what} cannot be met, only with tolerance={possible:g} or in a smaller "
-                    "bandwidth")
+            offers.append(f"tolerance={possible:g}")
+            break
         possible *= 1.2
-    return f"{what} cannot be met at all; ask for a smaller bandwidth"
+    if not offers:
+        return f"{what} cannot be met, nor in any narrower band that was tried"
+    return f"{what} cannot be met; it can with {' or '.join(offers)}"
+
+
+def _offers(elsewhere, rate, max_delay_s, tolerance):
+    """Wishes for a band, one of each kind, with which a filter has been seen to do."""
+    for name, high, shares, problems_of in elsewhere():
+        for share in shares:
+            end = float(f"{share * high:.2g}")
+            try:
+                problems = problems_of(end)
+            except DesignError:
+                continue
+            longest = _longest(problems, rate, max_delay_s)
+            if _worst([problem.solve(longest, tolerance) for problem in problems]) <= tolerance:
+                yield f"{name}={end:g}"
+                break
 
 
 def _rounded_up(value, digits):

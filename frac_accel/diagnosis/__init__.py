@@ -31,7 +31,7 @@ from .judgement import judge
 from .leftover import related
 from .read_off import drowned
 from .screened import screened
-from .spikes import spikes
+from .spikes import spikes, spikes_words
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
 from .stretches import MOST, strongest_part
 from .time_limit import TimeLimit
@@ -148,9 +148,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
                      if seed is not None and entry.effect.restates_core])
     engine, stray = _without_spikes(begin, used, stray, record.reference[:, column])
     if stray.any():
-        found.words.append(several(stray.sum(), "sample stands", "samples stand")
-                           + " far out, alone, while the reference does not: spikes, which count "
-                           "in no fit")
+        found.words.append(spikes_words(stray.sum()))
     engine.spikes, engine.aside = stray, stray | (record.valid & ~moving)
     engine.at_limit, engine.found = at_limit, found
     engine.identified = {cause: effect for cause, effect in (seed or {}).items() if effect.everyday}

@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from ..shown import several
+
 # Samples on either side that a spike may reach to.
 _REACH = 3
 # Samples on either side that say how far one may stand out here, and times that a spike stands
@@ -26,6 +28,13 @@ def spikes(sensor, reference):
     """
     found = _stands_out(sensor) & ~_stands_out(reference)
     return found if found.mean() <= _RARE else np.zeros(len(sensor), bool)
+
+
+def spikes_words(count):
+    """What is said of so many spikes: a band-limited reference cannot follow a shock, either."""
+    return (f"{several(count, 'sample stands', 'samples stand')} far out, alone, while the "
+            "reference does not: spikes, or shocks that the reference cannot follow, which count "
+            "in no fit")
 
 
 def _stands_out(values):

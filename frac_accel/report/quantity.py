@@ -47,14 +47,14 @@ def short(value, unit):
 
 
 def fixed(value):
-    """A value to three places, without the sign of a zero.
+    """A value to three places, without the sign of a zero; a dash where none is known.
 
     Examples
     --------
     >>> fixed(-0.0002), fixed(-1.5), fixed(float("nan"))
-    ('0.000', '-1.500', 'nan')
+    ('0.000', '-1.500', '-')
     """
-    return f"{round(value, 3) + 0.0:.3f}"
+    return "-" if math.isnan(value) else f"{round(value, 3) + 0.0:.3f}"
 
 
 def written(value, std, unit):
@@ -138,14 +138,27 @@ def rounded(value, std):
 
 
 def percent(share):
-    """A share in percent, to two digits, without an exponent.
+    """A share in percent, to two digits, without an exponent; ``unknown`` where it is.
 
     Examples
     --------
     >>> percent(0.000213), percent(1.094)
     ('0.021 %', '109 %')
     """
+    if math.isnan(share):
+        return "unknown"
     return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"
+
+
+def held_out_words(nrmse):
+    """What is left of held-out data (RMS, of the output), or that there are none.
+
+    Examples
+    --------
+    >>> held_out_words(0.01234), held_out_words(float("nan"))
+    ('1.234% on held-out data', 'too short to hold data out')
+    """
+    return f"{nrmse:.3%} on held-out data" if math.isfinite(nrmse) else "too short to hold data out"
 
 
 def left_open_by(parameters, core):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..correction.design import plateau
+from ..correction.design import NYQUIST_SHARE, plateau, require_wishes
 from ..errors import FracAccelError
 from ..identification.response.excitation import excited_band
 from ..io.samples import Samples
@@ -24,6 +24,9 @@ from .reference import restored
 
 # A stamp that has been moved by a skew and back.
 _ROUNDING_NS = 2
+# Share of an upper end below which another is less.
+_NEARLY = 0.95
+_WISHES = ("bandwidth_hz", "max_delay_s", "lowest_hz", "tolerance")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,37 +60,48 @@ class Validation(Shown):
     Attributes
     ----------
     simulation : ErrorMetrics
-        Of the simulated against the measured output; of a sensor that its model says lies turned,
-        of both turned into the reference's axes.
+        Of the simulated against the measured output, where the sensor follows the reference; of a
+        sensor that its model says lies turned, of both turned into the reference's axes.
     turned : bool
         Whether they were.
-    comparison : Comparison
-        Of raw and corrected samples against the reference.
+    comparison : Comparison or None
+        Of raw and corrected samples against the reference, in the band of the correction.
     filters : dict
-        Summary of the inverse filters.
+        Summary of the inverse filters; empty without a correction.
     counters : dict of str to int
-        Fate of the samples.
+        Fate of the samples; empty without a correction.
+    no_correction : str
+        Why there is none: the model's simulation can be judged all the same. Else empty.
     words : tuple of str
-        What was done to put reference and sensor together: rates, band, offset of the clocks.
+        What was done to put reference and sensor together (rates, band, offset of the clocks), and
+        why the correction is judged in a narrower band than the simulation.
     whole_nrmse : float
         RMS of simulated less measured output over the measured one's standard deviation, at all
         frequencies, without `simulation.EDGE` samples at both ends.
+    signals : tuple of ndarray
+        What the simulation was judged on: time [s], measured and simulated output.
     """
 
     simulation: ErrorMetrics
-    comparison: Comparison
+    comparison: Comparison | None
     filters: dict
     counters: dict
     words: tuple = ()
     whole_nrmse: float = float("nan")
     turned: bool = False
+    no_correction: str = ""
+    signals: tuple = dataclasses.field(default=(), repr=False)
 
     def __repr__(self):
-        return (f"<Validation: simulation {self.simulation.total.nrmse:.3%}, correction "
-                f"{self.comparison.corrected.total.nrmse:.3%} (NRMSE)>")
+        found = f"<Validation: simulation {self.simulation.total.nrmse:.3%}"
+        return f"{found} (NRMSE), no correction>" if self.comparison is None else \
+            f"{found}, correction {self.comparison.corrected.total.nrmse:.3%} (NRMSE)>"
 
     def _draw(self, figure):
         seen = self.comparison
+        if seen is None:
+            self._draw_simulation(figure)
+            return
         time = (seen.stamps_ns - seen.stamps_ns[0]) * 1e-9
         upper, lower = figure.subplots(2, sharex=True)
         for axes, signals in ((upper, {"reference": seen.reference, "corrected": seen.after}),
@@ -99,12 +113,23 @@ class Validation(Shown):
         upper.set_ylabel("acceleration [m/s²]")
         lower.set(xlabel="time [s]", ylabel="error [m/s²]")
 
+    def _draw_simulation(self, figure):
+        time, measured, simulated = self.signals
+        upper, lower = figure.subplots(2, sharex=True)
+        for name, values in (("measured", measured), ("simulated", simulated)):
+            upper.plot(*envelope(time, values), label=name, linewidth=0.8)
+        above(upper)
+        upper.set_ylabel("output")
+        lower.plot(*envelope(time, simulated - measured), linewidth=0.8)
+        lower.set(xlabel="time [s]", ylabel="simulated - measured")
+
     def as_dict(self):
         """Plain numbers, without the compared signals."""
         return {"simulation": self.simulation.as_dict(), "whole_nrmse": self.whole_nrmse,
                 "turned": self.turned,
-                **{name: getattr(self.comparison, name).as_dict()
+                **{name: self.comparison and getattr(self.comparison, name).as_dict()
                    for name in ("raw", "scaled", "corrected")},
+                "no_correction": self.no_correction,
                 "filters": self.filters, "counters": self.counters, "words": list(self.words)}
 
 
@@ -124,16 +149,17 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     sampling_rate_hz : float, optional
         Of arrays [Hz].
     **wishes
-        ``sampling_rate_hz``, ``bandwidth_hz``, ``max_delay_s``, ``lowest_hz`` as for `Corrector`.
+        ``bandwidth_hz``, ``max_delay_s``, ``lowest_hz``, ``tolerance`` as for `Corrector`.
 
     Returns
     -------
     Validation
+        Of the simulation alone where no correction can be designed, or judged.
 
     Raises
     ------
     FracAccelError
-        If the pair cannot be compared.
+        If the pair cannot be compared, or a wish is no number above 0.
 
     Examples
     --------
@@ -145,6 +171,35 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     """
     reference, sensor, pair, turned, measured, simulated = _simulated_of(
         source, model, axis, temperature_at, sampling_rate_hz)
+    require_wishes(**{name: value for name, value in wishes.items() if name in _WISHES})
+    band, rate = _judged_band(pair, AXES.index(axis)), pair.sampling_rate_hz
+    words, why, comparison, filters, counters = pair.words, "", None, {}, {}
+    try:
+        corrector, comparison = _correction(reference, sensor, model, axis, temperature_at, wishes)
+        filters, counters = corrector.design.summary(), corrector.counters
+        words = [*words, *_band_words(comparison, band, corrector.design, axis, wishes)]
+    except FracAccelError as error:
+        why = str(error)
+    return Validation(
+        simulation=error_metrics(measured, simulated, rate, octave_bands(*band)),
+        comparison=comparison, filters=filters, counters=counters, words=tuple(words),
+        whole_nrmse=_nrmse(measured, simulated), turned=turned, no_correction=why,
+        signals=(np.arange(len(measured)) / rate, measured, simulated))
+
+
+def _judged_band(pair, column):
+    """Where the sensor follows the reference [Hz], and both can be compared."""
+    low, high = excited_band(pair.reference[:, column], pair.sensor[:, column],
+                             pair.sampling_rate_hz)
+    high = min(high, pair.band_hz or np.inf)
+    if low >= high:
+        raise FracAccelError(f"the reference has no power below {high:.4g} Hz, up to which the "
+                             "records can be compared")
+    return low, high
+
+
+def _correction(reference, sensor, model, axis, temperature_at, wishes):
+    """The corrector after it has run over the record, and what it made of it."""
     corrector = Corrector(model, **wishes)
     parts, taken = zip(*_corrected(corrector, sensor, temperature_at))
     stamps, values, variance = (np.concatenate([getattr(part, name) for part in parts])
@@ -156,14 +211,24 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
         raise FracAccelError(f"{len(sensor.stamps_ns)} samples are fewer than the filter needs to "
                              f"warm up ({corrector.design.warm_up_samples})")
     seen = restamped(sensor, [each for each in taken if each])
-    comparison = compare(reference, seen, Samples.of(stamps, values, variance),
-                         corrector.design, axis)
-    bands = [band.band_hz for band in comparison.corrected.bands]
-    return Validation(
-        simulation=error_metrics(measured, simulated, pair.sampling_rate_hz, bands),
-        comparison=comparison, filters=corrector.design.summary(), counters=corrector.counters,
-        words=pair.words,
-        whole_nrmse=_nrmse(measured, simulated), turned=turned)
+    return corrector, compare(reference, seen, Samples.of(stamps, values, variance),
+                              corrector.design, axis)
+
+
+def _band_words(comparison, band, design, axis, wishes):
+    """Why the correction is judged up to a lower frequency than the simulation."""
+    high, known = comparison.corrected.total.band_hz[1], design.model.band_hz
+    end = design.axes[AXES.index(axis)].band_hz[1]
+    if wishes.get("bandwidth_hz") is not None or high >= _NEARLY * band[1] or high < end:
+        return []
+    if known and end >= known[1]:
+        why = "where the band in which the model was identified ends"
+    elif end >= _NEARLY * NYQUIST_SHARE * design.sampling_rate_hz / 2:
+        why = f"{NYQUIST_SHARE:g} of the Nyquist frequency"
+    else:
+        why = "where the sensor has lost 80 % of its gain"
+    return [f"the correction is judged up to {end:.4g} Hz only, {why}; the sensor follows the "
+            f"reference up to {band[1]:.4g} Hz"]
 
 
 def whole_nrmse(source, model, axis="x", temperature_at=None):

@@ -1,6 +1,7 @@
 """The commands: what they write, what they say, and how they refuse bad input."""
 
 import json
+import re
 import subprocess
 import sys
 import tracemalloc
@@ -9,9 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from frac_accel import SensorModel, read_bag, simulate, write_bag
+from frac_accel import SensorModel, read_bag, simulate, validate, write_bag
 from frac_accel.cli import main
+from frac_accel.errors import FracAccelError
 from frac_accel.io.bag import CORRECTED_TOPIC, RAW_TOPIC, REFERENCE_TOPIC, BagWriter, Samples, cdr
+from frac_accel.model.core import Arx
 from frac_accel.streaming import Corrector
 
 BAGS = Path(__file__).parents[2] / "bags"
@@ -83,6 +86,73 @@ def test_validate(tmp_path, capsys):
         assert said["simulation"]["total"]["nrmse"] < 0.01
         assert len(said["corrected"]["bands"]) > 2
     assert "corrected against reference, axis z" in capsys.readouterr().out
+
+
+@pytest.fixture
+def without_inverse(tmp_path):
+    """Bag and model of a sensor with a zero next to 0 Hz, as identified in z: nothing inverts it
+    down to 0 Hz."""
+    found = SensorModel(Arx((-0.999, 1.0), (1.0, -0.5), 200.0))
+    motion = np.random.default_rng(1).normal(size=(4000, 3))
+    stamps = np.arange(len(motion)) * 5_000_000
+    write_bag(tmp_path / "b.mcap", {REFERENCE_TOPIC: Samples.of(stamps, motion), RAW_TOPIC:
+                                    Samples.of(stamps, simulate(found, motion, 200.0))})
+    found.save(tmp_path / "m.yaml")
+    return [str(tmp_path / "b.mcap"), "--model", str(tmp_path / "m.yaml")]
+
+
+def test_a_model_without_a_correction_is_validated(without_inverse, tmp_path, capsys):
+    result, page = tmp_path / "r.json", tmp_path / "r.html"
+    command = ["validate", *without_inverse, "--json", str(result), "--report", str(page)]
+    assert main(command) == 0
+    said, shown = json.loads(result.read_text()), capsys.readouterr()
+    assert said["simulation"]["total"]["nrmse"] < 1e-6 and said["corrected"] is None
+    assert "simulated against measured" in shown.out and "filter:" not in shown.out
+    warning, = shown.err.strip().splitlines()
+    why = warning.removeprefix("warning: there is no correction: ")
+    offer = re.search("; it can with (--lowest) (.+)", why)
+    assert why != warning and why in page.read_text()
+    assert main([*command, *offer.groups()]) == 0
+    assert json.loads(result.read_text())["corrected"]["total"]["nrmse"] < 0.01
+    judged = validate(without_inverse[0], SensorModel.load(without_inverse[2]))
+    assert judged.comparison is None and "lowest_hz=" in judged.no_correction
+    assert "no correction" in repr(judged) and len(judged.plot().axes) == 2
+    with pytest.raises(FracAccelError, match="bandwidth_hz: -1"):
+        validate(without_inverse[0], SensorModel.load(without_inverse[2]), bandwidth_hz=-1)
+
+
+def test_a_refusal_offers_options_that_exist(without_inverse, tmp_path, refuse):
+    """Of a sensor that hides a frequency behind a zero outside the unit circle, at 2 Hz."""
+    radius = 1.08
+    zeros = 1.0, -2 * radius * np.cos(2 * np.pi * 2.0 / 200.0), radius**2
+    SensorModel(Arx(zeros, (1.0, -0.5, 0.0), 200.0)).save(without_inverse[2])
+    command = ["correct", *without_inverse, "-o", str(tmp_path / "c.mcap"), "--bandwidth", "60"]
+    line = refuse(*command)
+    offers = re.findall(r"(--\S+) ([\d.e-]+)", line)
+    assert {name for name, _ in offers} == {"--bandwidth", "--lowest", "--tolerance"}
+    assert "=" not in line
+    for offer in offers:
+        assert main([*command, *offer]) == 0
+
+
+def test_unknown_figures_are_told_in_words(tmp_path, capsys):
+    """As of a short record, of a sensor that can be corrected up to 4.4 Hz only."""
+    found = SensorModel.from_dict({
+        "schema": "frac_accel/sensor_model/1",
+        "core": {"natural_frequency_hz": 2.0, "damping_ratio": 0.7}})
+    motion = np.random.default_rng(1).normal(size=(444, 3))
+    stamps = np.arange(len(motion)) * 10_000_000
+    noise = 1e-3 * np.random.default_rng(2).normal(size=motion.shape)
+    write_bag(tmp_path / "b.mcap", {
+        REFERENCE_TOPIC: Samples.of(stamps, motion),
+        RAW_TOPIC: Samples.of(stamps, simulate(found, motion, 100.0) + noise)})
+    assert main(["identify", str(tmp_path / "b.mcap"), "-o", str(tmp_path / "m.yaml")]) == 0
+    shown = capsys.readouterr().out
+    assert "% of the output, too short to hold data out\n" in shown
+    assert main(["validate", str(tmp_path / "b.mcap"), "--model", str(tmp_path / "m.yaml")]) == 0
+    shown += capsys.readouterr().out
+    assert "nan" not in shown and "  -: the record is too short" in shown
+    assert "where the sensor has lost 80 % of its gain; the sensor follows" in shown
 
 
 def test_simulate(tmp_path):

@@ -70,7 +70,7 @@ def choose(data):
     if flat and rival < best:
         # not believed, but what names nothing must do better than its three parameters
         others, best = "a gain or an oscillator", rival
-    held_out = f"held-out residual {arx.held_out_nrmse:.3%} against {best:.3%}"
+    held_out = _against("held-out residual", arx.held_out_nrmse, best)
     if not arx.held_out_nrmse < _CLEARLY * best:
         return chosen, (f"{reason}; a free transfer function in z does not predict clearly better: "
                         f"{held_out}")
@@ -115,18 +115,25 @@ def _flat_instead(candidates):
             raise
         return None
     lead, share = _lead(classical.fit)
-    if flat.held_out_nrmse <= _NO_BETTER * classical.held_out_nrmse:
+    left = flat.held_out_nrmse
+    if left <= _NO_BETTER * classical.held_out_nrmse:
         why = "does not predict clearly better than a gain"
     elif share > _TAKEN_BACK and (
-            not in_sight or classical.held_out_nrmse > _CLEARLY * flat.held_out_nrmse):
+            not in_sight or classical.held_out_nrmse > _CLEARLY * left):
         why = (f"would answer {lead:.3g} s before the reference moves, as if that were smoothed; "
                "its parameters are open, and a gain is all that can be said")
     else:
         return None
     place = f"at {resonance:.4g} ± {std:.2g} Hz" if std < resonance else "at any frequency above"
     return flat, (f"no resonance shows up to {highest:.4g} Hz: an oscillator {place} {why} "
-                  f"(held-out residual "
-                  f"{classical.held_out_nrmse:.3%} against {flat.held_out_nrmse:.3%})")
+                  f"({_against('held-out residual', classical.held_out_nrmse, left)})")
+
+
+def _against(judged, one, other, of_other=""):
+    """What two candidates leave of data that they have not seen, in words."""
+    if not np.isfinite([one, other]).all():
+        return "the record is too short to hold data out"
+    return f"{judged} {one:.3%} against {other:.3%}{of_other}"
 
 
 def _lead(fit):
@@ -190,8 +197,8 @@ def _preferred(classical, fractional, datas, judged):
     order = fractional.fit["damping_order"]
     std = fractional.fit.std[fractional.fit.names.index("damping_order")]
     score = f"damping order {order:.4g} ± {std:.2g}"
-    held_out = (f"{judged} {fractional.held_out_nrmse:.3%} against "
-                f"{classical.held_out_nrmse:.3%} of the classical model")
+    held_out = _against(judged, fractional.held_out_nrmse, classical.held_out_nrmse,
+                        " of the classical model")
     if abs(order - 1) <= SIGNIFICANT * std:
         return classical, f"a fractional damping is not significant: {score}"
     if not fractional.held_out_nrmse < classical.held_out_nrmse:
