@@ -8,6 +8,7 @@ import numpy as np
 from ..parameters import parameter
 from .base import STAMPS, Effect, Reading
 from .residual_power import slope_of
+from .steady_beat import Start, SteadyBeat
 
 # Longest segment [samples] in which the beat's frequency must hold, and how many there must be.
 _SEGMENT, _SEGMENTS = 1024, 8
@@ -60,7 +61,7 @@ class PolledReadout(Effect):
         if seen.found.jitter_rms_s or seen.record.resampled or seen.is_coarse:
             return None  # values between samples have no age; rounding of steady motion beats, too
         error = seen.measured - seen.output
-        beat = Beat.of(error, seen.output, seen.used)
+        beat = Beat.of(seen.measured, seen.output, seen.used)
         if beat is None:
             return None
         rate, own = seen.record.sampling_rate_hz, beat.own_rate
@@ -71,7 +72,7 @@ class PolledReadout(Effect):
             error[seen.used], (error - beat.added)[seen.used],
             f"a lag that runs through {1e3 * interval / rate:.3g} ms as a sawtooth, "
             f"{beat.frequency * rate:.4g} times a second, makes {beat.share:.0%} of the error: the "
-            f"sensor samples at {words}", added=beat.added)
+            f"sensor samples at {words}; {beat.steadiness}", added=beat.added)
 
 
 class Beat(NamedTuple):
@@ -89,6 +90,8 @@ class Beat(NamedTuple):
         Of the error's power.
     added : ndarray, shape (n,)
         What it adds to the output.
+    steadiness : str
+        How its phase runs over the record, in words.
     """
 
     frequency: float
@@ -98,10 +101,12 @@ class Beat(NamedTuple):
     own_rate: float | None
     share: float
     added: np.ndarray
+    steadiness: str
 
     @classmethod
-    def of(cls, error, output, used):
-        """The beat in an error, or None; arrays of shape (n,)."""
+    def of(cls, measured, output, used):
+        """The beat in what a simulation leaves, or None; arrays of shape (n,)."""
+        error = measured - output
         size = min(_SEGMENT, len(error) // _SEGMENTS)
         if size < 8 * _SLOW_LINES:
             return None
@@ -137,9 +142,32 @@ class Beat(NamedTuple):
         turned = np.unwrap(phase)[::size] / (2 * np.pi)
         beat = float((turned[-1] - turned[0]) / (size * (len(turned) - 1)))
         wanders = float(np.std(np.diff(turned) / size) / np.sqrt(len(turned) - 1))
+        start = Start.of(shared, beat, wanders, rising, abs(first))
+        if start.is_steady:
+            steady = SteadyBeat.of(measured, output, used, start, height if rising else -height)
+            taken = float(np.sum(error**2) - np.sum(_without_slow(
+                (measured - output - steady.added) * used, slope, level, size)**2))
+            if taken > explained and abs(abs(steady.height) - height) < _ALIKE * height:
+                return cls._of_steady(steady, taken / total)
         rates = _own_rates(beat, height, height_std, rising)
         return cls(beat, wanders, height, height_std, float(rates[0]) if len(rates) == 1 else None,
-                   explained / total, added) if len(rates) else None
+                   explained / total, added, "its phase wanders: at one frequency "
+                   f"{min(start.adds_up, 1):.0%} of it adds up") if len(rates) else None
+
+    @classmethod
+    def _of_steady(cls, steady, share):
+        """The beat of one frequency all along a record, or None."""
+        height, std, words = abs(steady.height), steady.height_std, ""
+        rates = _own_rates(steady.frequency, height, std, steady.height > 0)
+        if not len(rates):
+            return None
+        own = float(rates[0]) if len(rates) == 1 else None
+        if own:
+            std = steady.frequency_std / own**2
+        if steady.wander:
+            words = f", beside a phase that wanders by {steady.wander:.2g} of a turn"
+        return cls(steady.frequency, steady.frequency_std, height, std, own, share, steady.added,
+                   "it has one frequency all along the record" + words)
 
 
 def _line(shared, slope, size):

@@ -1,0 +1,160 @@
+"""A lag that is a sawtooth of one frequency all along a record."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+# Deviations, and turns over the record, within which the frequency is looked for; steps for a turn.
+_WITHIN, _AT_LEAST, _STEPS = 4.0, 2.0, 8
+# Share of a beat that must add up at one frequency before its sawtooth is fitted.
+_ADDS_UP = 0.5
+# Turns that the jump takes in the fit's derivatives: wide at first, since a jump farther off has
+# none, and less and less; the fits at the last width, of which the best counts.
+_WIDTHS, _LAST = (0.3, 0.2, 0.13, 0.09, 0.05), 6
+# Stretches of equal power that count as independent, and the ratio of their phases' mean square
+# step to their variance (2 of chance) below which the phase wanders.
+_STRETCHES, _WANDERS = 32, 1.0
+# Times the rate at which the output is known before it is read between samples.
+_FINE = 4
+
+
+class SteadyBeat(NamedTuple):
+    """A sawtooth of one frequency, in sampling intervals.
+
+    Attributes
+    ----------
+    frequency, frequency_std : float
+        With its standard uncertainty.
+    height, height_std : float
+        Below zero where it falls.
+    added : ndarray, shape (n,)
+        What it adds to the output.
+    wander : float
+        RMS [turns] by which its phase wanders beyond chance; 0 where that does not show.
+    """
+
+    frequency: float
+    frequency_std: float
+    height: float
+    height_std: float
+    added: np.ndarray
+    wander: float
+
+    @classmethod
+    def of(cls, measured, output, used, start, height):
+        """The sawtooth that leaves least, from a `Start` and a height near it.
+
+        Least squares beside a gain, an offset, a delay and a skew. The uncertainty is that of the
+        scores of stretches as they are (P. J. Huber, 5th Berkeley Symposium 1 (1967) 221-233).
+
+        Parameters
+        ----------
+        measured, output : ndarray, shape (n,)
+        used : ndarray of bool, shape (n,)
+        start : Start
+        height : float
+            Below zero where the sawtooth falls.
+        """
+        read, steepness = _between(output)
+        count = np.arange(len(output))
+        time = count / len(output) - 0.5  # of the record: all turns are of the same order
+        # delay, height, turns in the middle, turns over the record
+        place = np.array([0.0, height, start.turn + start.frequency * len(output) / 2,
+                          start.frequency * len(output)])
+        best = None
+        for width in (*_WIDTHS, *[_WIDTHS[-1]] * _LAST):
+            turn = (place[2] + place[3] * time + 0.5) % 1 - 0.5
+            there = count + place[0] + place[1] * turn
+            values, slope = read(there), steepness(there) * used
+            error = (measured - values) * used
+            moves = place[1] * slope * np.where(abs(turn) < 0.5 - width / 2, 1.0, 1 - 1 / width)
+            columns = np.stack([used, values * used, slope * time, slope, slope * turn, moves,
+                                moves * time], axis=1)
+            inverse = np.linalg.pinv(columns.T @ columns, hermitian=True)
+            found = inverse @ (columns.T @ error)
+            error -= columns[:, :3] @ found[:3]
+            left = error @ error
+            if width == _WIDTHS[-1] and (best is None or left < best[0]):
+                best = left, place.copy(), columns, inverse, error, turn
+            place += found[3:]
+        _, place, columns, inverse, error, turn = best
+        scores, weights = _by_stretches(columns, error)
+        stds = np.sqrt(np.diag(inverse @ (scores.T @ scores) @ inverse))
+        phases = scores[:, 5] / np.maximum(weights, 1e-300)
+        steps = np.diff(phases)
+        wander = float(np.std(phases))
+        if np.mean(steps**2) < _WANDERS * wander**2:
+            # as the mean of its steps, each from one stretch to the next
+            stds[6] = np.hypot(stds[6], np.std(steps) * np.sqrt(len(phases)))
+        else:
+            wander = 0.0
+        return cls(float(place[3]) / len(output), float(stds[6]) / len(output), float(place[1]),
+                   float(stds[4]), (read(count + place[1] * turn) - output) * used, wander)
+
+
+class Start(NamedTuple):
+    """Where a sawtooth's fit begins.
+
+    Attributes
+    ----------
+    frequency : float
+        In turns by sample, near which most adds up over a whole record.
+    turn : float
+        Of the sawtooth at the first sample; -0.5 and 0.5 are its jump.
+    adds_up : float
+        Share of the first harmonic that adds up there.
+    """
+
+    frequency: float
+    turn: float
+    adds_up: float
+
+    @classmethod
+    def of(cls, shared, frequency, std, rising, tracked):
+        """From a share in the slope, shape (n,), near a coarse frequency, and the size of its first
+        harmonic where its phase is followed."""
+        count = np.arange(len(shared))
+        span = max(_WITHIN * std, _AT_LEAST / len(shared))
+        size = max(int(1 / (8 * span)), 1)
+        blocks = -(-len(shared) // size)
+        points = _STEPS * blocks
+        edges = np.arange(0, len(shared), size)
+        spectra = [np.fft.fft(np.add.reduceat(
+            shared * np.exp(-2j * np.pi * k * frequency * count), edges), points) for k in (1, 2)]
+        steps = np.arange(-int(span * points * size), int(span * points * size) + 1)
+        power = sum(abs(spectrum[k * steps % points])**2
+                    for k, spectrum in zip((1, 2), spectra))
+        frequency += steps[np.argmax(power)] / (points * size)
+        first = np.sum(shared * np.exp(-2j * np.pi * frequency * count))
+        # a rising sawtooth whose first harmonic is a cosine is zero a quarter before its crest
+        return cls(float(frequency),
+                   float(np.angle(first) / (2 * np.pi) + (0.25 if rising else -0.25)),
+                   float(abs(first) / max(tracked, 1e-300)))
+
+    @property
+    def is_steady(self):
+        """Whether enough adds up for a fit."""
+        return self.adds_up > _ADDS_UP
+
+
+def _between(output):
+    """Functions of places among the samples: the output, and its slope."""
+    from scipy.interpolate import CubicSpline
+    from scipy.signal import resample_poly
+    fine = output[0] + resample_poly(output - output[0], _FINE, 1)
+    spline = CubicSpline(np.arange(len(fine)) / _FINE, fine)
+    slope = spline.derivative()
+
+    def limited(places):
+        return np.clip(places, 0, len(output) - 1)
+    return lambda places: spline(limited(places)), lambda places: slope(limited(places))
+
+
+def _by_stretches(columns, error):
+    """Sums of a fit's scores by stretches in which the phase has equal weight, and that weight."""
+    power = columns[:, 5]**2
+    total = np.cumsum(power)
+    stretch = np.minimum((total / max(total[-1], 1e-300) * _STRETCHES).astype(int), _STRETCHES - 1)
+    scores = np.stack([np.bincount(stretch, column * error, _STRETCHES) for column in columns.T],
+                      axis=1)
+    return scores, np.bincount(stretch, power, _STRETCHES)
