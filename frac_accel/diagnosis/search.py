@@ -469,8 +469,8 @@ class Search:
                       key=lambda fit: fit.cost)
         best = beam[0]
         for added in range(most):
-            if self.problem.limit.ends_search(
-                    f"sets of more than {several(len(best.causes - self.base.keys()), 'cause')} were not tried"):
+            known = several(len(best.causes - self.base.keys()), "cause")
+            if self.problem.limit.ends_search(f"sets of more than {known} were not tried"):
                 break
             self.stages.enter_round(f"searching for cause {added + 1}", SEARCHED)
             wanted = {}

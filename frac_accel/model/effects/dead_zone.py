@@ -8,7 +8,6 @@ from ..parameters import parameter
 from .base import DEAD_ZONE, Effect
 from .fit_starts import positive
 
-
 # Shares of the samples that must lie below zero, and above.
 _BOTH_SIDES = 0.01, 0.99
 
