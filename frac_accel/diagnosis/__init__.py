@@ -21,7 +21,6 @@ from ..record import Record
 from ..record.clipping import at_limits
 from ..record.orientation import Orientation, turned_away
 from ..record.sources import pair_of
-from ..shown import several
 from ..simulation import AxisSimulator
 from .engine import Engine
 from .event import event, start
