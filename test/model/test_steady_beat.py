@@ -1,0 +1,65 @@
+"""The beat of a polled read-out has the frequency that the whole record determines."""
+
+import numpy as np
+import pytest
+
+from frac_accel.model.effects.polled_readout import Beat
+
+COUNT, RATE = 12_000, 200.0
+TIME = np.arange(COUNT) / RATE
+
+
+def polled(rng, noise, wander_s=0.0):
+    """What a sensor says that another clock reads, the motion that late on average, and the
+    interval of the sensor's clock."""
+    frequency = rng.uniform(0.5, 45.0, 60)
+    size, phase = rng.normal(size=60) / np.sqrt(60), rng.uniform(0, 2 * np.pi, 60)
+
+    def motion(t):
+        return sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in zip(size, frequency, phase))
+    interval = 1 / (RATE * rng.integers(1, 4) + rng.choice([-1, 1]) * rng.uniform(15, 70))
+    ticks = (TIME + wander_s * np.sin(0.4 * TIME)) / interval + rng.random()
+    values = motion(TIME - interval * (ticks % 1))
+    values += noise * values.std() * rng.normal(size=COUNT)
+    return values, motion(TIME - interval / 2), interval
+
+
+def told(rng, noise, wander_s=0.0):
+    """The beat, and how far its frequency and interval are off, in standard uncertainties."""
+    values, output, interval = polled(rng, noise, wander_s)
+    beat = Beat.of(values, output, np.ones(COUNT, bool))
+    if beat is None:
+        return None
+    turns = 1 / (interval * RATE) % 1
+    return beat, (beat.frequency - min(turns, 1 - turns)) / beat.frequency_std, (
+        1 / beat.own_rate - interval * RATE) / beat.std
+
+
+def test_uncertainties_cover_what_they_should():
+    rng = np.random.default_rng(71)
+    found = [told(rng, 10**rng.uniform(-2.5, -0.7)) for _ in range(60)]
+    found = [entry for entry in found if entry is not None]
+    assert len(found) > 45
+    for off in np.array([entry[1:] for entry in found]).T:
+        assert 0.5 < np.sqrt(np.mean(off**2)) < 1.3
+        assert np.mean(abs(off) < 2) > 0.9
+    # a thousandth of a turn over the record
+    assert np.median([beat.frequency_std for beat, *_ in found]) < 0.001 / COUNT
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_little_is_left_beside_it(seed):
+    rng = np.random.default_rng([72, seed])
+    values, output, _ = polled(rng, 0.01)
+    beat = Beat.of(values, output, np.ones(COUNT, bool))
+    assert np.std(values - output - beat.added) < 0.03 * np.std(values)
+    assert beat.steadiness == "it has one frequency all along the record"
+
+
+@pytest.mark.parametrize("turns", [0.01, 0.1])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_phase_that_wanders_has_no_false_precision(turns, seed):
+    interval = polled(np.random.default_rng([73, seed]), 0.03)[2]
+    beat, off, _ = told(np.random.default_rng([73, seed]), 0.03, turns * interval)
+    assert "wanders" in beat.steadiness and abs(off) < 3
+    assert beat.frequency_std * COUNT > turns
