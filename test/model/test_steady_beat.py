@@ -47,13 +47,14 @@ def test_uncertainties_cover_what_they_should():
     assert np.median([beat.frequency_std for beat, *_ in found]) < 0.001 / COUNT
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_little_is_left_beside_it(seed):
-    rng = np.random.default_rng([72, seed])
-    values, output, _ = polled(rng, 0.01)
-    beat = Beat.of(values, output, np.ones(COUNT, bool))
-    assert np.std(values - output - beat.added) < 0.03 * np.std(values)
-    assert beat.steadiness == "it has one frequency all along the record"
+def test_little_is_left_beside_it():
+    left = []
+    for seed in range(10):
+        values, output, _ = polled(np.random.default_rng([72, seed]), 0.01)
+        beat = Beat.of(values, output, np.ones(COUNT, bool))
+        if beat is not None:  # where the motion has a line at the beat, none is told
+            left.append(np.std(values - output - beat.added) / np.std(values))
+    assert len(left) > 7 and np.median(left) < 0.015 and max(left) < 0.1
 
 
 @pytest.mark.parametrize("turns", [0.01, 0.1])

@@ -143,31 +143,25 @@ class Beat(NamedTuple):
         beat = float((turned[-1] - turned[0]) / (size * (len(turned) - 1)))
         wanders = float(np.std(np.diff(turned) / size) / np.sqrt(len(turned) - 1))
         start = Start.of(shared, beat, wanders, rising, abs(first))
+        words = f"its phase wanders: at one frequency {min(start.adds_up, 1):.0%} of it adds up"
+        steady = None
         if start.is_steady:
             steady = SteadyBeat.of(measured, output, used, start, height if rising else -height)
             taken = float(np.sum(error**2) - np.sum(_without_slow(
                 (measured - output - steady.added) * used, slope, level, size)**2))
             if taken > explained and abs(abs(steady.height) - height) < _ALIKE * height:
-                return cls._of_steady(steady, taken / total)
+                beat, wanders, words = steady.frequency, steady.frequency_std, steady.words
+                added, explained = steady.added, taken
+            else:
+                steady = None
         rates = _own_rates(beat, height, height_std, rising)
-        return cls(beat, wanders, height, height_std, float(rates[0]) if len(rates) == 1 else None,
-                   explained / total, added, "its phase wanders: at one frequency "
-                   f"{min(start.adds_up, 1):.0%} of it adds up") if len(rates) else None
-
-    @classmethod
-    def _of_steady(cls, steady, share):
-        """The beat of one frequency all along a record, or None."""
-        height, std, words = abs(steady.height), steady.height_std, ""
-        rates = _own_rates(steady.frequency, height, std, steady.height > 0)
         if not len(rates):
             return None
         own = float(rates[0]) if len(rates) == 1 else None
-        if own:
-            std = steady.frequency_std / own**2
-        if steady.wander:
-            words = f", beside a phase that wanders by {steady.wander:.2g} of a turn"
-        return cls(steady.frequency, steady.frequency_std, height, std, own, share, steady.added,
-                   "it has one frequency all along the record" + words)
+        if steady:
+            height = abs(steady.height)
+            height_std = wanders / own**2 if own else steady.height_std
+        return cls(beat, wanders, height, height_std, own, explained / total, added, words)
 
 
 def _line(shared, slope, size):

@@ -46,6 +46,12 @@ class SteadyBeat(NamedTuple):
     added: np.ndarray
     wander: float
 
+    @property
+    def words(self):
+        """How its phase runs."""
+        return "it has one frequency all along the record" + (
+            f", beside a phase that wanders by {self.wander:.2g} of a turn" if self.wander else "")
+
     @classmethod
     def of(cls, measured, output, used, start, height):
         """The sawtooth that leaves least, from a `Start` and a height near it.
