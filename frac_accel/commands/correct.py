@@ -83,8 +83,9 @@ def run(arguments):
     if corrector.batch_size:
         notes.append(f"the samples come {corrector.batch_size:.4g} at a time with one stamp: their "
                      "instants are taken as uniform")
-    found_in = corrector.model.metadata.get("provenance", {}).get("bag")
-    if corrector.model.of_one_record and found_in != printable(Path(arguments.bag).name):
+    source = corrector.model.metadata.get("provenance")
+    if corrector.model.of_one_record and not (
+            isinstance(source, dict) and source.get("bag") == printable(Path(arguments.bag).name)):
         notes.append(corrector.model.of_one_record)
     for warning in [*reader.warnings, *notes]:
         print(f"warning: {warning}")

@@ -21,8 +21,9 @@ from ._common import (
 
 # Share of what is left from which a part of the error budget is told.
 _SHOWN = 0.01
-# Times what the model in use leaves, from which an extended model that leaves more is not written.
-_WORSE = 2.0
+# Times what the model in use or the extended one leaves of held-out data, and share of the output,
+# from which an extended model is not written that leaves more of the whole record.
+_WORSE, _MUCH = 2.0, 0.2
 
 EXAMPLES = """
 frac_accel diagnose drive.mcap --model sensor.yaml --report found.html
@@ -80,7 +81,7 @@ def run(arguments):
     result = found.as_dict(arguments.extended_model)
     if arguments.extended_model and found.model is not None:
         found.model.metadata["provenance"] = source
-        result["extended"]["validated_nrmse"] = _write_extended(found, arguments, reader)
+        _write_extended(found, arguments, reader, result["extended"])
     if arguments.report:
         from ..report.diagnosis import diagnosis_page
         page = diagnosis_page(found, source)
@@ -90,24 +91,24 @@ def run(arguments):
     write_json(arguments.json, {**result, "provenance": source})
 
 
-def _write_extended(found, arguments, reader):
-    """Write the extended model unless it does worse than the one in use; NRMSE of the whole record
-    that `validate` gives of it, or None."""
+def _write_extended(found, arguments, reader, told):
+    """Write the extended model unless it does worse than is claimed, and tell what `validate` finds
+    of it."""
     file, model = arguments.extended_model, found.model
-    validated = _validated(model, arguments, reader)
-    in_use = max(found.baseline["nrmse"], found.extended["nrmse"])
-    if validated is not None and validated > _WORSE * in_use:
-        say(f"{file}: not written: simulated from the record's start, the extended model leaves "
-            f"{validated:.3%} of the whole record's output, and the model in use {in_use:.3%} of "
-            "the held-out part's")
-        return validated
+    validated = told["validated_nrmse"] = _validated(model, arguments, reader)
+    most = max(found.baseline["nrmse"], found.extended["nrmse"])
+    if validated is not None and validated > max(_WORSE * most, _MUCH):
+        say(f"{file}: not written: validate finds that the extended model leaves {validated:.3%} "
+            f"of the whole record's output; the model in use leaves {found.baseline['nrmse']:.3%} "
+            "of what is held out")
+        told["model"] = None
+        return
     model.save(file)
     say(f"{file}: written" + (
         f"; validate finds that it leaves {validated:.3%} of the whole record's output"
         if validated is not None else ""))
     if model.of_one_record:
         say(f"{file}: {model.of_one_record}")
-    return validated
 
 
 def _validated(model, arguments, reader):

@@ -1,5 +1,6 @@
 """From fitted causes to a verdict: what is named, what is not, and why."""
 
+import contextlib
 import dataclasses
 from typing import NamedTuple
 
@@ -279,6 +280,12 @@ def _suspect(causes, margin, reason):
             "experiment": separating_experiment(causes)}
 
 
+def _once_each(suspects):
+    """Suspects without those that have been told for another reason."""
+    first = {tuple(each["causes"]): each for each in reversed(suspects)}
+    return [each for each in suspects if first[tuple(each["causes"])] is each]
+
+
 def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise, shown_by):
     fraction = _remaining(engine, best, left.noise_rms) if left.share > 0 else 0.0
     findings, fitted, stds, more = _sure(engine, best, findings, tied, left, fraction)
@@ -340,7 +347,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         + hidden_words(account.own, account.error) + late,
         {"rmse": account.before, "nrmse": account.before / spread,
          "noise_rms": floor or left.noise_rms},
-        findings, list({tuple(each["causes"]): each for each in suspects[::-1]}.values())[::-1],
+        findings, _once_each(suspects),
         {"rmse": after, "nrmse": after / spread},
         _by_itself(findings, fitted, floor, fraction) if verdict == "explained"
         else float(min(fraction, 1.0)), model, found,
@@ -484,9 +491,10 @@ def _with_identified(engine, best, fitted, stds):
     if any(effect.clock_ratio() != 1 or effect.time_steps() for effect in effects) \
             and not any(delay.cause in (effect.cause, effect.mirrors) for effect in effects):
         # with the orders of filters that were found without it
-        fitted = engine.search.to_its_best(
-            engine.search.again({delay.cause: delay, **fitted.effects}))
-        stds = engine.uncertainties(fitted)
+        with contextlib.suppress(FracAccelError):
+            fitted = engine.search.to_its_best(
+                engine.search.again({delay.cause: delay, **fitted.effects}))
+            stds = engine.uncertainties(fitted)
     more = {cause: effect for cause, effect in common.items() if cause not in fitted.effects
             and (not odd or cause in needed)}
     if not more:

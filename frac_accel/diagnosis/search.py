@@ -449,12 +449,12 @@ class Search:
         Each that joined took the most at its time: a delay, then a resonance for what the delay
         lacks, and so on, until together they imitate a filter of higher order.
         """
-        several = {cause for cause, effect in best.effects.items()
+        filters = {cause for cause, effect in best.effects.items()
                    if cause not in self.base and acts_as_filter(effect)}
-        if len(several) < 2 or _is_nonlinear(best) or self.problem.limit.ends_search(
+        if len(filters) < 2 or _is_nonlinear(best) or self.problem.limit.ends_search(
                 "one filter in place of several was not tried"):
             return best
-        rest = self.fit({c: effect for c, effect in best.effects.items() if c not in several})
+        rest = self.fit({c: effect for c, effect in best.effects.items() if c not in filters})
         chosen = [(cause, begin) for _, cause, begin in self.screen(rest)
                   if acts_as_filter(begin)][:_FITS]
         alone = [self.varied(fit) for fit in

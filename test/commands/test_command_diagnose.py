@@ -262,3 +262,17 @@ def test_a_refusal_names_the_bag(tmp_path, capsys):
                     "/imu/data_raw": Samples.of(stamps, values)})
     assert main(["diagnose", str(bag)]) == 2
     assert capsys.readouterr().err.startswith(f"frac_accel diagnose: {bag}: reference: ")
+
+
+def test_an_extended_model_that_does_worse_is_not_written(files, tmp_path, monkeypatch, capsys):
+    """Its claim is of held-out samples, beside free motions that no file has."""
+    source, model, _ = files("explained")
+    monkeypatch.setattr("frac_accel.validation.whole_nrmse", lambda *arguments: 26.9)
+    extended, result = tmp_path / "e.yaml", tmp_path / "r.json"
+    assert main(["diagnose", source, "--model", model, "--extended-model", str(extended),
+                 "--json", str(result)]) == 0
+    said = capsys.readouterr().out
+    assert not extended.exists()
+    assert "e.yaml: not written: validate finds that the extended model leaves 2690.000%" in said
+    told = json.loads(result.read_text())["extended"]
+    assert told["validated_nrmse"] == 26.9 and told["model"] is None
