@@ -172,6 +172,6 @@ def test_delays_have_prefixes(value, words):
 
 
 @pytest.mark.parametrize("value, words", [
-    (-0.0004, "0.000"), (-0.0006, "-0.001"), (12.3456, "12.346"), (float("nan"), "nan")])
+    (-0.0004, "0.000"), (-0.0006, "-0.001"), (12.3456, "12.346"), (float("nan"), "-")])
 def test_a_zero_has_no_sign(value, words):
     assert fixed(value) == words
