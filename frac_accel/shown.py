@@ -36,6 +36,11 @@ def several(count: int, one: str, more: str | None = None) -> str:
     return f"{count} {one}" if count == 1 else f"{count} {more or one + 's'}"
 
 
+def listed(names: list[str]) -> str:
+    """``x, y and z``."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
 def above(axes: Any) -> None:
     """Put the legend of a matplotlib Axes above it, where it hides no peak."""
     axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=4, frameon=False, fontsize="small",

@@ -78,16 +78,8 @@ def run(arguments):
         if not counters["given"]:
             raise BagError(f"{arguments.bag}: topic {arguments.sensor}: nothing could be corrected "
                            f"of {counters['samples']} samples: {fates(counters)}")
-    notes = [f"the variance is without the model's parameter uncertainty: {note}"
-             for note in dict.fromkeys(corrector.design.notes) if note]
-    if corrector.batch_size:
-        notes.append(f"the samples come {corrector.batch_size:.4g} at a time with one stamp: their "
-                     "instants are taken as uniform")
-    source = corrector.model.metadata.get("provenance")
-    if corrector.model.of_one_record and not (
-            isinstance(source, dict) and source.get("bag") == printable(Path(arguments.bag).name)):
-        notes.append(corrector.model.of_one_record)
-    for warning in [*reader.warnings, *notes]:
+    warnings = [*reader.warnings, *_notes(corrector, arguments.bag)]
+    for warning in warnings:
         print(f"warning: {warning}")
     summary = corrector.design.summary()
     print(f"{arguments.output}: {counters['given']} of {counters['samples']} samples corrected at "
@@ -110,7 +102,21 @@ def run(arguments):
         page(sink.kept(), reader, corrector, arguments).write(arguments.report)
         say(f"{arguments.report}: written")
     write_json(arguments.json, {"output": str(arguments.output), "counters": counters,
-                                "filters": summary, "warnings": [*reader.warnings, *notes]})
+                                "filters": summary, "warnings": warnings})
+
+
+def _notes(corrector, bag):
+    """What a user must know of a correction."""
+    notes = [f"the variance is without the model's parameter uncertainty: {note}"
+             for note in dict.fromkeys(corrector.design.notes) if note]
+    if corrector.batch_size:
+        notes.append(f"the samples come {corrector.batch_size:.4g} at a time with one stamp: their "
+                     "instants are taken as uniform")
+    source = corrector.model.metadata.get("provenance")
+    if corrector.model.of_one_record and not (
+            isinstance(source, dict) and source.get("bag") == printable(Path(bag).name)):
+        notes.append(corrector.model.of_one_record)
+    return notes
 
 
 def fates(counters):

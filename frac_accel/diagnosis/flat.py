@@ -11,7 +11,6 @@ from ..model.effects import Effect, known_effects
 from ..model.parameters import parameter_fields
 from .engine import LONG, Engine
 from .gain import gain
-from .search import acts_as_filter
 from .stretches import strongest_part
 
 # Links that are fitted, and the share of an oscillator's residual power that one may leave: by
@@ -164,10 +163,7 @@ def _as_open(finding, other, beside):
 def _with_a_link(engine, fitted):
     """Fits with one link more, the best first."""
     search = engine.search
-    fits = search.fit_all([search.begun(fitted, cause, begin)
-                           for _, cause, begin in [entry for entry in search.screen(fitted)
-                                                   if acts_as_filter(entry[2])][:_FITTED]],
-                          fitted.cost)
+    fits = search.with_a_filter(fitted, _FITTED, fitted.cost)
     # one of another order may be the best, and none needs what the oscillator was identified with
     return sorted((search.prune(search.varied(fit), engine.threshold) for fit in fits),
                   key=lambda fit: fit.cost)

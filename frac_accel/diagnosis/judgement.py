@@ -315,10 +315,10 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     described, kept, after, output = {}, {}, account.after, None
     if verdict in _INCOMPLETE or (strange and not plain):
         described, after, output = _described(engine, fitted, after, {part for _, part in strange})
-        wider, after, output = _kept(engine, fitted, widest, after, output)
+        wider, known, after, output = _kept(engine, fitted, widest, after, output)
         if wider is not None:
             # named causes are what they are in the model that is written
-            kept, known = wider.effects, engine.uncertainties(wider)
+            kept = wider.effects
             findings = [dataclasses.replace(f, effect=kept[f.cause], std=known[f.cause])
                         if f.cause in kept and f.cause in known else f for f in findings]
     named = {f.cause: f.effect for f in findings}
@@ -586,28 +586,29 @@ def _described(engine, fitted, after, parts):
 
 def _kept(engine, fitted, widest, after, output):
     """Fit of a set with linear causes that are only suspected, where it predicts held-out data
-    clearly better than all else that describes them, its held-out error and its output; or None,
-    and those given."""
+    clearly better than all else that describes them, its standard uncertainties, its held-out error
+    and its output; or None, nothing, and those given."""
     p, rest = engine.problem, engine.held_out_rows
     more = {cause: effect for cause, effect in widest.effects.items()
             if cause not in fitted.causes and (is_link(effect) or effect.pure_delay_s()
                                                or effect.is_constant or effect.restates_core)}
     if not more or p.limit.ends_judging("what is only suspected was not kept as a description"):
-        return None, after, output
+        return None, {}, after, output
     slow = [effect for effect in {**more, **fitted.effects}.values() if effect.acts_on_slow_motion]
     if len(slow) > 1:
-        return None, after, output  # they cancel but for a free motion, which no model can have
+        return None, {}, after, output  # they cancel but for a free motion, which no model can have
     wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
     errors = [(p.measured - engine.learnt(fit).output)[rest] for fit in (fitted, wider)]
     error = _rms(p.measured - wider.output, rest)
     better = gain(*errors)
     if not better.is_relevant or engine.hollow(wider) \
-            or max(error, _rms(errors[1], slice(None))) > _CLEARLY * after \
-            or left_open(engine, wider, engine.uncertainties(wider),
-                         [c for c in wider.effects if c in fitted.effects
-                          and c not in engine.search.base]):
-        return None, after, output
-    return wider, error, wider.output
+            or max(error, _rms(errors[1], slice(None))) > _CLEARLY * after:
+        return None, {}, after, output
+    stds = engine.uncertainties(wider)
+    if left_open(engine, wider, stds,
+                 wider.causes & fitted.causes - engine.search.base.keys()):
+        return None, {}, after, output
+    return wider, stds, error, wider.output
 
 
 def _of_reference(engine, effects, named):

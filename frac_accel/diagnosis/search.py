@@ -455,13 +455,17 @@ class Search:
                 "one filter in place of several was not tried"):
             return best
         rest = self.fit({c: effect for c, effect in best.effects.items() if c not in filters})
-        chosen = [(cause, begin) for _, cause, begin in self.screen(rest)
-                  if acts_as_filter(begin)][:_FITS]
-        alone = [self.varied(fit) for fit in
-                 self.fit_all([self.begun(rest, *join) for join in chosen])[:_BEAM]]
+        alone = map(self.varied, self.with_a_filter(rest, _FITS)[:_BEAM])
         return min((fit for fit in alone
                     if fit.cost <= (1 + _TIE / self.problem.count) * best.cost),
                    key=lambda fit: fit.cost, default=best)
+
+    def with_a_filter(self, fitted, most, best=np.inf):
+        """Fits with one filter more by cost, of the `most` that promise most; none of those that
+        fall far behind the best cost is fitted to the end."""
+        chosen = [(cause, begin) for _, cause, begin in self.screen(fitted)
+                  if acts_as_filter(begin)][:most]
+        return self.fit_all([self.begun(fitted, *join) for join in chosen], best)
 
     def grow(self, seeds, threshold, promises, done, most):
         """The best set that grows from any of some; `most` is the number of causes to be added."""

@@ -1,7 +1,7 @@
 """The verdict and its words."""
 
 from ..budget import WORDS
-from ..shown import several
+from ..shown import listed, several
 
 # Share of the output's RMS that may be left without noise being established, and factor by which an
 # error may exceed noise that is.
@@ -76,19 +76,15 @@ def description_words(described, unnamed, kept, left):
     were identified with it, and those that are only suspected, with what they leave."""
     parts = []
     if described:
-        parts.append(f"has {_listed(described)}, which describes a part of it and names nothing")
+        parts.append(f"has {listed(described)}, which describes a part of it and names nothing")
     if unnamed:
-        parts.append(f"keeps {_listed(unnamed)} without a name")
+        parts.append(f"keeps {listed(unnamed)} without a name")
     if kept:
         describe, are, them = (("describes", "is", "it") if len(kept) == 1 else
                                ("describe", "are", "them"))
-        parts.append(f"keeps {_listed(kept)}, which {describe} a part of it and {are} not named: "
+        parts.append(f"keeps {listed(kept)}, which {describe} a part of it and {are} not named: "
                      f"{_percent(left)} of the output is left with {them}")
     return "; the extended model " + "; it ".join(parts) if parts else ""
-
-
-def _listed(causes):
-    return " and ".join([*filter(None, [", ".join(causes[:-1])]), causes[-1]])
 
 
 def hint_words(share):

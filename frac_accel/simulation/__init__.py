@@ -315,8 +315,8 @@ class AxisSimulator:
         moving = deviation - start
         filtering = [effect for effect in behind if effect.stage < GAIN]
         if filtering:
-            conditioner = _kept_of_short(self._conditioners, path, _behind_core, moving,
-                                         self._rate * steps, steps > 1)
+            make = functools.partial(Convolution, oversampled=steps > 1)
+            conditioner = _kept_of_short(self._conditioners, path, make, moving, self._rate * steps)
             moving = conditioner.response(_product(filtering, conditioner.s), consumed=True)
         gain = _product([effect for effect in behind if effect.stage >= GAIN], np.array([1j]))
         start *= _static_gain(lambda s: _product(filtering, s)) if start else 0.0
@@ -379,10 +379,6 @@ def _changed_by_path(linear, deviation, interval_s, effects):
         passed = linear + deviation
         deviation = deviation + effect.change_motion(passed, interval_s) - passed
     return deviation
-
-
-def _behind_core(moving, rate, oversampled):
-    return Convolution(moving, rate, oversampled=oversampled)
 
 
 def static_gain(model):

@@ -7,6 +7,7 @@ import numpy as np
 from ...errors import IdentificationError
 from ...model import AXES
 from ...record import Record
+from ...shown import listed
 from ..response.frequency_response import bulk_delay
 from .clipped import clipped_reference, clipped_sensor
 
@@ -171,7 +172,7 @@ def _dependent(values):
     if strength[0] > _COLLINEAR:
         return ""
     dependent = np.any(np.abs(direction[:, strength <= _COLLINEAR]) > 0.1, axis=1)
-    return _listed([AXES[i] for i in excited[dependent]])
+    return listed([AXES[i] for i in excited[dependent]])
 
 
 def _excited(values):
@@ -269,8 +270,3 @@ def _unclipped(reference, sensor, valid, pair, column):
         notes.append(f"{words}, which do not count")
         valid = valid & ~found.samples
     return valid, notes
-
-
-def _listed(names):
-    """x, y and z."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
