@@ -122,7 +122,8 @@ def table(result, axis):
                          f"{fixed(band.phase_error_deg):>12} {fixed(100 * band.peak_error):>10}")
         lines.append(f"  median relative error {fixed(metrics.median_relative_error_percent)} %")
         if metrics is result.simulation:
-            lines.append(f"  at all frequencies: NRMSE {fixed(100 * result.whole_nrmse)} %")
+            where = f"up to {result.whole_hz:.4g} Hz" if result.whole_hz else "at all frequencies"
+            lines.append(f"  {where}: NRMSE {fixed(100 * result.whole_nrmse)} %")
         if any(not math.isfinite(band.nrmse) for band in metrics.bands):
             lines.append("  -: the record is too short to tell, or the reference too quiet there")
     if not result.comparison:

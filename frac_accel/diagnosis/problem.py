@@ -10,11 +10,11 @@ from scipy.optimize import lsq_linear
 from ..errors import FracAccelError
 from ..identification.response.excitation import strongest_stretch
 from ..model import AXES, AxisModel, is_link
-from ..model.core.oscillator import tail_rates
 from ..model.effects.base import CORE, CROSS_AXIS, GAIN, Effect
 from ..model.parameters import Scales, fixed_values, parameter_fields
 from ..signals.kept import kept
 from ..simulation import EDGE, AxisSimulator
+from ..simulation.free_motion import fading, free_motions
 from .short_columns import ShortColumns
 from .time_limit import TimeLimit
 
@@ -30,8 +30,6 @@ _STEPS = 4
 _STEPS_OF_SLOPES = 2
 # Times the largest measured value from which a simulated one counts as without a bound.
 _UNBOUND = 1e6
-# Logarithm of what is left of a decay where it ends.
-_GONE = -60.0
 # A gain of this share of one sample's error changes nothing that the data can tell.
 _SMALL_GAIN = 1e-2
 
@@ -302,48 +300,16 @@ class Problem:
         return kept(self._columns, model.dynamics, self._free_columns, model, most=2)
 
     def _free_columns(self, model):
-        try:
-            poles = np.atleast_1d(model.poles())
-        except (FracAccelError, ArithmeticError):
-            poles = np.array([])
-        if any(pole == 0 for pole in poles):
-            # the constant and the drift that a reference behind a high-pass has lost
-            poles = poles[poles != 0]
-            lost = [np.ones(len(self.time)), self.time / self.time[-1]]
-        else:
-            lost = []
-        core, rates = model.effective_core, []
-        if getattr(core, "damping_order", 1.0) != 1.0:
-            rates = tail_rates(core.natural_frequency_hz, self.time[-1])
-        decays = self._decays([*(-rate + 0j for rate in rates), *poles])
-        return ShortColumns.of(np.c_[decays, np.array(lost).T] if lost else decays)
+        return ShortColumns.of(free_motions(model, self.time, self.used))
 
     def own_motions(self, effect):
         """Orthonormal `ShortColumns`: slow motions that a cause of its own may have left."""
         slow = [pole for pole in np.atleast_1d(effect.poles())
                 if -pole.real * EDGE < self.rate]
-        columns = self._decays([pole for pole in slow if pole != 0])
+        columns = fading([pole for pole in slow if pole != 0], self.time, self.used)
         if any(pole == 0 for pole in slow):
             columns = np.c_[columns, np.ones(len(columns)), self.time]
         return ShortColumns.of(columns).orthonormal(self.used)[0]
-
-    def _decays(self, poles):
-        columns = []
-        for pole in poles:
-            if pole.imag < 0 or -pole.real * self.time[-1] < 0.999:
-                continue
-            # as far as there is anything left of it
-            time = self.time[:1 + int(min(_GONE * self.rate / pole.real, len(self.time)))]
-            decay, turn = np.exp(pole.real * time), pole.imag * time
-            columns += [decay] if pole.imag == 0 else [decay * np.cos(turn), decay * np.sin(turn)]
-        columns = [column for column in columns
-                   if np.max(np.abs(column * self.used[:len(column)])) > 1e-9]
-        # before the first sample that counts, they would grow backwards without bound
-        first = int(np.argmax(self.used))
-        result = np.zeros((len(self.record), len(columns)))
-        for i, column in enumerate(columns):
-            result[first:len(column), i] = column[first:]
-        return result
 
     def clear(self, values, free):
         """Values where they count, without the free motions; shape (n,) or (n, p)."""

@@ -13,17 +13,21 @@ from ..io.samples import Samples
 from ..model import AXES, SensorModel
 from ..model.effects.axis_mixing import turn_back
 from ..record import Record
+from ..record.resampling import within
 from ..record.sources import pair_of
 from ..shown import Shown, above
 from ..signals.metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
 from ..signals.thinning import envelope
 from ..simulation import EDGE, simulate
+from ..simulation.free_motion import free_motions
 from ..streaming import Corrector
 from ..streaming.batches import restamped
 from .reference import restored
 
 # A stamp that has been moved by a skew and back.
 _ROUNDING_NS = 2
+# Share of the largest free motion from which one counts.
+_SEEN = 1e-6
 # Share of an upper end below which another is less.
 _NEARLY = 0.95
 _WISHES = ("bandwidth_hz", "max_delay_s", "lowest_hz", "tolerance")
@@ -77,7 +81,10 @@ class Validation(Shown):
         why the correction is judged in a narrower band than the simulation.
     whole_nrmse : float
         RMS of simulated less measured output over the measured one's standard deviation, at all
-        frequencies, without `simulation.EDGE` samples at both ends.
+        frequencies, without `simulation.EDGE` samples at both ends and without what the time before
+        the record may have left of the sensor's motion, which nobody knows.
+    whole_hz : float or None
+        Frequency up to which that counts, where rates differ; None where all do.
     signals : tuple of ndarray
         What the simulation was judged on: time [s], measured and simulated output.
     """
@@ -88,6 +95,7 @@ class Validation(Shown):
     counters: dict
     words: tuple = ()
     whole_nrmse: float = float("nan")
+    whole_hz: float | None = None
     turned: bool = False
     no_correction: str = ""
     signals: tuple = dataclasses.field(default=(), repr=False)
@@ -126,6 +134,7 @@ class Validation(Shown):
     def as_dict(self):
         """Plain numbers, without the compared signals."""
         return {"simulation": self.simulation.as_dict(), "whole_nrmse": self.whole_nrmse,
+                "whole_hz": self.whole_hz,
                 "turned": self.turned,
                 **{name: self.comparison and getattr(self.comparison, name).as_dict()
                    for name in ("raw", "scaled", "corrected")},
@@ -183,8 +192,8 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     return Validation(
         simulation=error_metrics(measured, simulated, rate, octave_bands(*band)),
         comparison=comparison, filters=filters, counters=counters, words=tuple(words),
-        whole_nrmse=_nrmse(measured, simulated), turned=turned, no_correction=why,
-        signals=(np.arange(len(measured)) / rate, measured, simulated))
+        whole_nrmse=_nrmse(measured, simulated, pair), whole_hz=pair.band_hz, turned=turned,
+        no_correction=why, signals=(np.arange(len(measured)) / rate, measured, simulated))
 
 
 def _judged_band(pair, column):
@@ -236,11 +245,18 @@ def whole_nrmse(source, model, axis="x", temperature_at=None):
 
     Parameters and errors as those of `validate`.
     """
-    return _nrmse(*_simulated_of(source, model, axis, temperature_at)[-2:])
+    *_, pair, _, measured, simulated = _simulated_of(source, model, axis, temperature_at)
+    return _nrmse(measured, simulated, pair)
 
 
-def _nrmse(measured, simulated):
-    return float(np.sqrt(np.mean((measured - simulated)**2)) / np.std(measured))
+def _nrmse(measured, simulated, pair):
+    """As far as both can be compared: beyond it, what one of them cannot show is no error."""
+    error = measured - simulated
+    if pair.band_hz:
+        none = np.zeros(len(error), bool)
+        error, measured = (within(values, pair.sampling_rate_hz, pair.band_hz, none, none)
+                           for values in (error, measured))
+    return float(np.sqrt(np.mean(error**2)) / np.std(measured))
 
 
 def _simulated_of(source, model, axis, temperature_at, sampling_rate_hz=None):
@@ -343,6 +359,7 @@ def _simulated(model, pair, column, temperature_at, back):
     instants = np.round(1e9 * at).astype(np.int64)
     inside, edge = pair.valid.copy(), min(EDGE, len(pair) // 16)
     inside[:edge] = inside[len(pair) - edge:] = False
+    own = model.axis(AXES[column])
 
     def begun(initial):
         simulated = simulate(model, pair.reference, pair.sampling_rate_hz, initial=initial,
@@ -351,10 +368,18 @@ def _simulated(model, pair, column, temperature_at, back):
         shifted = interpolate(instants, simulated, instants + round(1e9 * pair.lag_s),
                               pair.sampling_rate_hz) @ rows
         run = _longest_run(np.isfinite(shifted) & inside, instants, pair.sampling_rate_hz)
-        return measured[run], shifted[run]
+        return measured[run], shifted[run] + _begun_before(
+            own, (measured - shifted)[run], pair.sampling_rate_hz)
     # how it moved before the record is not known: a free mass does not move on by itself
     return min((begun(initial) for initial in ("steady", "rest")),
                key=lambda both: np.mean(np.square(both[0] - both[1])))
+
+
+def _begun_before(own, error, rate):
+    """What the time before the record has left of an axis' slow motion: as nobody knows it, that
+    which fits best."""
+    free = free_motions(own, np.arange(len(error)) / rate, np.ones(len(error), bool))
+    return free @ np.linalg.lstsq(free, error, rcond=_SEEN)[0] if free.size else 0.0
 
 
 def _longest_run(good, stamps_ns, rate):

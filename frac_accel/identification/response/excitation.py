@@ -8,11 +8,15 @@ from scipy.ndimage import uniform_filter1d
 
 from ...errors import IdentificationError
 from ...signals.averaged_spectra import coherence_of, power_of, segment_spectra
+from .recognise import recognise
 
 # Power of a line or band, of the strongest, below which it is not excitation but noise or leakage.
 _FLOOR = 1e-4
 # Bins over which the window (its side lobes are 92 dB down) spreads a pure line.
 _LINE_BINS = 8
+# Order below which averaged segments may only be too short to tell lines apart, and the kinds of
+# excitation that have few.
+_FEW, _OF_SINES = 8, ("sine", "stepped_sine")
 # Share of the reference's energy that a held-out check learns from; RMS of the rest, over that of
 # the former, below which it is too quiet for a judgement; stretches of which every other is then
 # held out.
@@ -201,7 +205,9 @@ def persistent_excitation(reference, sampling_rate_hz):
     """Order of persistent excitation and the lines that give it.
 
     Each sine is persistently exciting of order 2 (L. Ljung, *System Identification*, 2nd ed.,
-    section 13.2); a stretch of continuous spectrum counts as many as its width holds.
+    section 13.2); a stretch of continuous spectrum counts as many as its width holds. Where
+    averaged segments tell few lines apart and the record is none of sines, such as a short sweep,
+    they are counted with the resolution of the whole record.
 
     Returns
     -------
@@ -209,7 +215,14 @@ def persistent_excitation(reference, sampling_rate_hz):
     lines_hz : list of float
         Frequencies of the lines, or places within a stretch of continuous spectrum.
     """
-    frequency, power = _spectrum(reference, sampling_rate_hz, weighted_mean=True)
+    lines = _lines(*_spectrum(reference, sampling_rate_hz, weighted_mean=True))
+    if 2 * len(lines) < _FEW and recognise(reference, sampling_rate_hz).kind not in _OF_SINES:
+        lines = _lines(*_spectrum(reference, sampling_rate_hz, True, len(reference)))
+    return 2 * len(lines), lines
+
+
+def _lines(frequency, power):
+    """Lines of a spectrum [Hz]."""
     strong = np.flatnonzero(power > _FLOOR * power.max())
     stretches = np.split(strong, np.flatnonzero(np.diff(strong) > 1) + 1) if len(strong) else []
     lines = []
@@ -219,7 +232,7 @@ def persistent_excitation(reference, sampling_rate_hz):
         weight, moment = (np.add.reduceat(values[stretch], first)
                           for values in (power, power * frequency))
         lines += (moment / weight).tolist()
-    return 2 * len(lines), lines
+    return lines
 
 
 def require_excitation(reference, sampling_rate_hz, parameters):
@@ -314,8 +327,8 @@ def _energy(reference, valid=None):
     return np.cumsum(power if valid is None else power * valid)
 
 
-def _spectrum(reference, sampling_rate_hz, weighted_mean=False):
-    length = _segment(reference)
+def _spectrum(reference, sampling_rate_hz, weighted_mean=False, length=None):
+    length = length or _segment(reference)
     return (np.fft.rfftfreq(length, 1 / sampling_rate_hz),
             power_of(segment_spectra(reference, "blackmanharris", length, weighted_mean)))
 
