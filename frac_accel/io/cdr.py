@@ -166,13 +166,8 @@ class Temperatures(NamedTuple):
     frame_id: str
 
 
-def read_temperatures(messages: Sequence[bytes]) -> Temperatures:
-    """Temperatures of serialised messages; `BagError` if malformed."""
-    return read_temperatures_at(*_joined(messages))
-
-
 def read_temperatures_at(buffer: bytes, offsets: np.ndarray, lengths: np.ndarray) -> Temperatures:
-    """Like `read_temperatures`, of messages that lie in ``buffer`` at ``offsets``."""
+    """Temperatures of messages that lie in ``buffer`` at ``offsets``; `BagError` if malformed."""
     if len(offsets) == 0:
         return Temperatures(np.empty(0, np.int64), np.empty(0), np.empty(0), "")
     records, frame_id = _records(TEMPERATURE, buffer, offsets, lengths)
@@ -281,14 +276,13 @@ def _patched(type_name, messages, stamps_ns, values, variance, is_whole) -> list
     values = np.asarray(values, dtype=np.float64)
     alike = _alike(type_name, messages)
     if alike is None:
-        variances = [None] * len(messages) if variance is None else np.asarray(variance)
-        if is_whole:
-            messages = [_without_covariance(type_name, message) for message in messages]
+        if len(messages) == 1:
+            _checked_layout(type_name, messages[0])  # says what is wrong
+        ones = (slice(i, i + 1) for i in range(len(messages)))
         return [
-            patch_sample(type_name, message, stamp_ns, value, of_message)
-            for message, stamp_ns, value, of_message in zip(
-                messages, stamps_ns.tolist(), values, variances
-            )
+            _patched(type_name, messages[one], stamps_ns[one], values[one],
+                     None if variance is None else np.asarray(variance)[one], is_whole)[0]
+            for one in ones
         ]
     records = alike[0]
     records["sec"], records["nanosec"] = split_stamps(stamps_ns)
@@ -302,35 +296,6 @@ def _patched(type_name, messages, stamps_ns, values, variance, is_whole) -> list
         covariance[:, _DIAGONAL] = variance
     size, patched = len(messages[0]), bytes(records.base)
     return [patched[start : start + size] for start in range(0, len(patched), size)]
-
-
-def _without_covariance(type_name: str, message: bytes) -> bytes:
-    header, fields = _checked_layout(type_name, message)
-    if "covariance" not in fields:
-        return message
-    start = header.body_offset + fields["covariance"].offset
-    size = 8 * fields["covariance"].count
-    return message[:start] + bytes(size) + message[start + size :]
-
-
-def patch_sample(
-    type_name: str, message: bytes, stamp_ns: int, value, variance=None
-) -> bytes:
-    """One message as in `patch_samples`, without its cost of setting up arrays."""
-    header, fields = _checked_layout(type_name, message)
-    order, body = header.byte_order, header.body_offset
-    sec, nanosec = divmod(int(stamp_ns), 1_000_000_000)
-    if not -(2**31) <= sec < 2**31:
-        raise BagError(f"time stamp {stamp_ns} ns is outside the range of a ROS time")
-    patched = bytearray(message)
-    struct.pack_into(order + "iI", patched, 4, sec, nanosec)
-    struct.pack_into(order + "3d", patched, body + fields["acceleration"].offset, *value)
-    if variance is not None and "covariance" in fields:
-        covariance = body + fields["covariance"].offset
-        for element, element_variance in zip(range(9)[_DIAGONAL], variance):
-            if element_variance == element_variance:  # not NaN
-                struct.pack_into(order + "d", patched, covariance + 8 * element, element_variance)
-    return bytes(patched)
 
 
 def restamped(message: bytes, stamp_ns: int) -> bytes:

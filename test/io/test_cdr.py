@@ -107,8 +107,9 @@ def test_patching_changes_stamp_acceleration_and_diagonal_only(type_name, frames
     variance = rng.uniform(1, 2, size=(len(truth), 3))
     variance[1, 2] = np.nan
     patched = cdr.patch_samples(type_name, data, stamps, values, variance)
-    one_by_one = [cdr.patch_sample(type_name, *row) for row in zip(data, stamps, values, variance)]
-    assert patched == one_by_one
+    one_by_one = [cdr.patch_samples(type_name, *([part] for part in row))
+                  for row in zip(data, stamps, values, variance)]
+    assert [[one] for one in patched] == one_by_one
     for before, after, ros_message, i in zip(data, patched, truth, range(len(truth))):
         ros_message.header.stamp.sec, ros_message.header.stamp.nanosec = divmod(
             int(stamps[i]), 10**9
@@ -215,12 +216,18 @@ def test_point_clouds_that_are_no_blocks(change, says):
         cdr.read_point_cloud(serialised(cdr.POINT_CLOUD2, cloud))
 
 
+def read_temperatures(messages):
+    """Of messages that follow each other in a buffer, as in a bag."""
+    lengths = np.array([len(one) for one in messages])
+    return cdr.read_temperatures_at(b"".join(messages), np.cumsum(lengths) - lengths, lengths)
+
+
 def test_temperatures():
     rng = np.random.default_rng(9)
     truth = [message(rng, cdr.TEMPERATURE, frame) for frame in ("a", "a", "abc", "")]
     truth[1].variance = 0.0
     data = [serialised(cdr.TEMPERATURE, m) for m in truth]
-    read = cdr.read_temperatures(data)
+    read = read_temperatures(data)
     assert read.stamps_ns.tolist() == [stamp_ns(m) for m in truth]
     assert read.celsius.tolist() == [m.temperature for m in truth]
     assert np.isnan(read.variance).tolist() == [False, True, False, False]
@@ -240,11 +247,11 @@ def test_hostile_bytes_raise_bag_errors_only(type_name):
     def read(data):
         try:
             if type_name == cdr.TEMPERATURE:
-                cdr.read_temperatures([data, whole])
+                read_temperatures([data, whole])
             else:
                 cdr.read_samples(type_name, [data, whole])
                 if type_name != cdr.POINT_CLOUD2:
-                    cdr.patch_sample(type_name, data, 0, (1, 2, 3), (1, 2, 3))
+                    cdr.patch_samples(type_name, [data], [0], [(1, 2, 3)], [(1, 2, 3)])
         except BagError:
             return False
         return True

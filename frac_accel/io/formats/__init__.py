@@ -6,6 +6,7 @@ What is read is first made an MCAP file, so that there is one road for every com
 import atexit
 import contextlib
 import heapq
+import importlib
 import shutil
 import sqlite3
 import tempfile
@@ -26,6 +27,8 @@ TABLES = {".csv": "csv", ".tsv": "csv", ".txt": "csv", ".parquet": "parquet", ".
           ".npz": "npz", ".npy": "npy", ".mf4": "mdf", ".mdf": "mdf"}
 """Tables by the ends of their names."""
 
+_MODULES = {"csv": "arrow", "parquet": "arrow", "npz": "numpy_file", "npy": "numpy_file",
+            "mdf": "mdf"}
 _HELP = "pip install 'frac_accel[formats]'"
 _made = {}
 
@@ -132,9 +135,7 @@ def _write_table(sources, infos, kind, target):
                 left_out[info.name] = info.count
     if not topics:
         raise BagError(f"{target}: the inputs hold no topic of acceleration or temperature")
-    writers = {"csv": ("arrow", "write_csv"), "parquet": ("arrow", "write_parquet"),
-               "npz": ("numpy_file", "write_npz"), "mdf": ("mdf", "write_mdf")}
-    write = _function(*writers[kind])
+    write = _function("write", kind)
     written, _ = _write_output(target, lambda path: write(path, topics), infos)
     return {name: written[name] for name in topics}, left_out
 
@@ -169,11 +170,8 @@ def _write_output(target, write, infos):
 
 
 def _read_table(kind, path):
-    module, function = {"csv": ("arrow", "read_csv"), "parquet": ("arrow", "read_parquet"),
-                        "npz": ("numpy_file", "read_npz"), "npy": ("numpy_file", "read_npy"),
-                        "mdf": ("mdf", "read_mdf")}[kind]
     try:
-        return _function(module, function)(path)
+        return _function("read", kind)(path)
     except OSError as error:
         raise BagError(f"{path}: cannot be read: {error.strerror or error}") from None
     except ValueError as error:
@@ -183,9 +181,10 @@ def _read_table(kind, path):
         raise BagError(f"{path}: cannot be read: {' '.join(str(error).split())}") from None
 
 
-def _function(module, name):
-    import importlib
-    return getattr(importlib.import_module(f".{module}", __package__), name)
+def _function(verb, kind):
+    """Reader or writer of a kind of table; its library is loaded with it."""
+    module = importlib.import_module(f".{_MODULES[kind]}", __package__)
+    return getattr(module, f"{verb}_{kind}")
 
 
 def _write_messages(target, topics, messages):

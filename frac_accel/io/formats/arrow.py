@@ -6,7 +6,7 @@ cells, and stamps stay whole numbers.
 
 from ...errors import BagError
 from ..regular_file import open_regular
-from .columns import Group, columns_of, require_plausible_size
+from .columns import Group, columns_of, is_number, require_plausible_size
 
 _HEAD_BYTES = 64 * 1024
 
@@ -91,8 +91,4 @@ def _decoded(head):
 
 
 def _is_number(text):
-    try:
-        float(text.replace(",", "."))
-    except ValueError:
-        return False
-    return True
+    return is_number(text.replace(",", "."))

@@ -265,11 +265,12 @@ def _numbers(column, name):
             return column.values.astype(float)
     except (TypeError, ValueError):
         pass
-    odd = next(value for value in column.values.tolist() if not _is_number(value))
+    odd = next(value for value in column.values.tolist() if not is_number(value))
     raise FracAccelError(f"column '{name}' holds {odd!r}, expected numbers")
 
 
-def _is_number(value):
+def is_number(value):
+    """Whether a cell holds a number, or text that is one."""
     try:
         float(value)
     except (TypeError, ValueError):
