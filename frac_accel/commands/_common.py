@@ -234,7 +234,7 @@ def printable(name):
 
 def provenance(bag, command):
     """Where a result comes from: the bag, its content's hash, the command and our version."""
-    from importlib.metadata import PackageNotFoundError, version
+    from .. import __version__
     path = Path(bag)
     files = sorted([*path.glob("*.mcap"), *path.glob("*.db3*")]) if path.is_dir() else [path]
     digest = hashlib.sha256()
@@ -242,12 +242,8 @@ def provenance(bag, command):
         with open_regular(file) as stream:
             while part := stream.read(1 << 20):
                 digest.update(part)
-    try:
-        ours = version("frac_accel")
-    except PackageNotFoundError:
-        ours = "not installed"
     return {"bag": printable(path.name), "sha256": digest.hexdigest(),
-            "command": printable(command), "frac_accel_version": ours}
+            "command": printable(command), "frac_accel_version": __version__}
 
 
 def _without_nan(value):

@@ -13,13 +13,13 @@ import resource
 import sys
 import tempfile
 import time
-from importlib.metadata import PackageNotFoundError, version
 
 from ..errors import FracAccelError
 from ..fleet.places import at_hand, output_at
 from ..fleet.workers import package_version
 from ..io.outputs import together
-from ._common import one_line
+from ._common import one_line, write_json
+from .report import page_of
 
 # What a verb writes beside its result.
 _OUTPUTS = {"correct": ".mcap", "identify": ".yaml"}
@@ -58,6 +58,8 @@ def row(task):
 
 
 def _row(task):
+    import numpy
+    import scipy
     began_s, cpu_s = time.monotonic(), time.process_time()
     told = {**task.get("carried", {}), "bag": task["bag"], "verb": task["verb"],
             "axis": task.get("axis", ""), "error": "", "is_fatal": False}
@@ -75,7 +77,9 @@ def _row(task):
         told["error"] = f"the options are not those of {task['verb']}"
     except Exception as error:  # one bag must not end the work on the others
         told["error"] = f"an error that nobody has foreseen: {type(error).__name__}: {error}"
-    return {**told, **_costs(began_s, cpu_s), **_versions()}
+    return {**told, **_costs(began_s, cpu_s), "frac_accel": package_version(),
+            "numpy": numpy.__version__, "scipy": scipy.__version__,
+            "python": sys.version.split()[0]}
 
 
 def _is_full(error):
@@ -127,23 +131,12 @@ def _kept(task, data):
     """Result and page of one bag, beside the rows."""
     kept = {"result": f"{task['verb']}-files/{task['name']}.json"}
     with output_at(f"{task['results']}/{kept['result']}") as path:
-        from ._common import write_json
         write_json(path, data)
     if task.get("pages") and data.get("verdict") not in _UNREMARKABLE:
         kept["page"] = f"{task['verb']}-files/{task['name']}.html"
         with output_at(f"{task['results']}/{kept['page']}") as path:
-            _page(data).write(path)
+            page_of(data).write(path)
     return kept
-
-
-def _page(data):
-    if "verdict" in data:
-        from ..diagnosis import Diagnosis
-        from ..report.diagnosis import diagnosis_page
-        return diagnosis_page(Diagnosis.from_dict(data), data.get("provenance"))
-    from ..identification import Identification
-    from ..report.identification import identification_page
-    return identification_page(Identification.from_dict(data), data.get("provenance"))
 
 
 def _of_diagnosis(data):
@@ -202,13 +195,3 @@ def _costs(began_s, cpu_s):
             # the most that this worker has had, in this bag or an earlier one
             "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024e-6,
             "worker": f"{platform.node()}:{os.getpid()}"}
-
-
-def _versions():
-    def of(name):
-        try:
-            return version(name)
-        except PackageNotFoundError:
-            return "not installed"
-    return {"frac_accel": package_version(), "numpy": of("numpy"), "scipy": of("scipy"),
-            "python": sys.version.split()[0]}

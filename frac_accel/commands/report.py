@@ -44,16 +44,20 @@ def _page(path, data):
         if not isinstance(data, dict) or not {"verdict", "structure"} & data.keys():
             raise FracAccelError("no result of a diagnosis or an identification, expected what "
                                  "frac_accel diagnose or identify --json writes")
-        source = data.get("provenance")
-        if "verdict" in data:
-            from ..diagnosis import Diagnosis
-            from ..report.diagnosis import diagnosis_page
-            return diagnosis_page(Diagnosis.from_dict(data), source)
-        from ..identification import Identification
-        from ..report.identification import identification_page
-        return identification_page(Identification.from_dict(data), source)
+        return page_of(data)
     except FracAccelError as error:
         raise FracAccelError(f"{path}: {error}") from None
+
+
+def page_of(data):
+    """Page of a result of diagnose or identify, from what --json writes of it."""
+    if "verdict" in data:
+        from ..diagnosis import Diagnosis
+        from ..report.diagnosis import diagnosis_page
+        return diagnosis_page(Diagnosis.from_dict(data), data.get("provenance"))
+    from ..identification import Identification
+    from ..report.identification import identification_page
+    return identification_page(Identification.from_dict(data), data.get("provenance"))
 
 
 def _read(path):

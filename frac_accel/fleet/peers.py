@@ -11,7 +11,7 @@ from .groups import FEWEST
 _MAD = 1.4826
 
 
-def odd_vehicles(estimates, owners, rate=FALSE_DISCOVERY_RATE):
+def odd_vehicles(estimates, owners):
     """Vehicles that differ from their peers in a cause.
 
     The peers' centre and spread are the median and the median absolute deviation, which a few odd
@@ -34,7 +34,8 @@ def odd_vehicles(estimates, owners, rate=FALSE_DISCOVERY_RATE):
     centre = _median(values)
     with np.errstate(invalid="ignore", divide="ignore"):
         deviations = (values - centre) / stds / usual_scatter(estimates)
-    odd = discoveries((2 * ndtr(-np.abs(deviations))).ravel(), rate).reshape(values.shape)
+    odd = discoveries((2 * ndtr(-np.abs(deviations))).ravel(),
+                      FALSE_DISCOVERY_RATE).reshape(values.shape)
     found = []
     for row in np.flatnonzero(odd.any(axis=1)):
         cause = int(np.nanargmax(np.where(odd[row], np.abs(deviations[row]), np.nan)))
@@ -61,7 +62,7 @@ def _median(values):
                      for own in (column[np.isfinite(column)] for column in values.T)])
 
 
-def common_causes(named, groups, rate=FALSE_DISCOVERY_RATE):
+def common_causes(named, groups):
     """Causes that single bags name more often in a group of vehicles than elsewhere.
 
     Parameters
@@ -87,6 +88,6 @@ def common_causes(named, groups, rate=FALSE_DISCOVERY_RATE):
                 "group": name, "cause": cause, "vehicles": inside, "of": int(rows.sum()),
                 "elsewhere": int(has.sum()) - inside, "of_elsewhere": int((~rows).sum()),
                 "p_value": float(hypergeom.sf(inside - 1, len(has), has.sum(), rows.sum()))})
-    passed = discoveries([entry["p_value"] for entry in found], rate)
+    passed = discoveries([entry["p_value"] for entry in found], FALSE_DISCOVERY_RATE)
     return sorted((entry for entry, good in zip(found, passed) if good),
                   key=lambda entry: entry["p_value"])

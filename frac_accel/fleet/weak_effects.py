@@ -57,7 +57,7 @@ class WeakEffect:
         return f"{count} {', '.join(self.confusable_with)}"
 
 
-def weak_effects(estimates, groups, rate=FALSE_DISCOVERY_RATE):
+def weak_effects(estimates, groups):
     """Causes that groups of vehicles show together, the clearest first.
 
     In each pass all causes in all groups are tested against a mean of zero and the scatter that a
@@ -72,7 +72,6 @@ def weak_effects(estimates, groups, rate=FALSE_DISCOVERY_RATE):
     ----------
     estimates : Estimates
     groups : dict of str to ndarray of bool, shape (n,)
-    rate : float
 
     Returns
     -------
@@ -86,12 +85,12 @@ def weak_effects(estimates, groups, rate=FALSE_DISCOVERY_RATE):
         tests = {(name, cause): own for name, rows in groups.items()
                  for cause, *own in _tested(estimates, rows, usual)}
         passed = [key for key, good in zip(tests, discoveries(
-            [pooled.p_value for pooled, _ in tests.values()], rate / 2)) if good]
+            [pooled.p_value for pooled, _ in tests.values()], FALSE_DISCOVERY_RATE / 2)) if good]
         if not passed:
             break
         group = max(passed, key=lambda key: tests[key][1])[0]
         rows, shown = groups[group], [cause for name, cause in passed if name == group]
-        behind, at_work = _behind(estimates, rows, shown, rate / 2)
+        behind, at_work = _behind(estimates, rows, shown)
         best = max(behind, key=lambda cause: tests[group, cause][1])
         pooled = tests[group, best][0]
         names = {estimates.names[cause][0] for cause in behind} - {estimates.names[best][0]}
@@ -117,7 +116,7 @@ def _tested(estimates, rows, usual):
                    (weight @ values)**2 / weight.sum())
 
 
-def _behind(estimates, rows, shown, rate):
+def _behind(estimates, rows, shown):
     """Causes that may be behind what a group shows, and how many of them are needed."""
     own = dataclasses.replace(estimates, **{name: getattr(estimates, name)[rows] for name in (
         "values", "stds", "sizes", "correlations")})
@@ -126,15 +125,15 @@ def _behind(estimates, rows, shown, rate):
     # a cause that the group does not show by itself leaves what it does show as it is
     for at_work, choices in ((1, [(cause,) for cause in tested]),
                              (2, list(itertools.combinations(shown, 2)))):
-        enough = [causes for causes in choices if _is_enough(own, causes, rate)]
+        enough = [causes for causes in choices if _is_enough(own, causes)]
         if enough:
             return sorted(set().union(*enough)), at_work
     return shown, 3
 
 
-def _is_enough(own, causes, rate):
+def _is_enough(own, causes):
     """Whether nothing is left in a group beside some causes."""
     everyone = np.ones(len(own.values), bool)
     p_values = [pooled.p_value for _, pooled, _ in _tested(
         own.beside(everyone, causes), everyone, np.ones(len(own.names)))]
-    return min(p_values, default=1.0) * len(p_values) > rate
+    return min(p_values, default=1.0) * len(p_values) > FALSE_DISCOVERY_RATE / 2

@@ -229,7 +229,7 @@ class Cluster:
 
     def _require_same(self, client):
         versions = client.run(package_version, on_error="return")
-        mine = ours()
+        mine = package_version()
         others = sorted({version if isinstance(version, str) else "none that can be imported"
                          for version in versions.values()} - {mine})
         if others:
@@ -278,15 +278,7 @@ def _key(entry):
     return entry["bag"], entry.get("axis", "")
 
 
-def ours():
-    """Version of the package that this process runs."""
-    return package_version()
-
-
 def package_version():
     """Version of the package that a process runs."""
-    from importlib.metadata import PackageNotFoundError, version
-    try:
-        return version("frac_accel")
-    except PackageNotFoundError:
-        return "not installed"
+    from .. import __version__
+    return __version__

@@ -26,12 +26,12 @@ def discrepancy(section, found):
 
 def _in_time(section, seen):
     whole = seen.signals["whole"]
-    section.figure(figures.time_signals(None, whole["output"], whole["residual"]),
+    section.figure(figures.time_signals(whole["output"], whole["residual"]),
                    "Sensor's output, measured and simulated from the reference, and the residuals "
                    "(measured less simulated)" + thinned(seen.samples, MOST_POINTS))
     part = seen.signals.get("close_up")
     if part:
-        section.figure(figures.time_signals(None, part["output"], part["residual"]),
+        section.figure(figures.time_signals(part["output"], part["residual"]),
                        f"The {seen.close_up_samples} samples with the strongest output.")
 
 

@@ -36,7 +36,7 @@ class ResponseCurve:
     phase_interval_rad: tuple | None = None
 
 
-def bode(curve, points=None, modelled=None, unit="output units per m/s²"):
+def bode(curve, points=None, modelled=None):
     """Amplitude and phase over frequency.
 
     Parameters
@@ -45,15 +45,14 @@ def bode(curve, points=None, modelled=None, unit="output units per m/s²"):
     points : ResponsePoints, optional
     modelled : ndarray of complex, shape (k,)
         The model's response at the frequencies of the points.
-    unit : str
-        Of the amplitude.
 
     Returns
     -------
     plotly.graph_objects.Figure
     """
-    figure = panels.rows(2, 560, "frequency [Hz]", [f"amplitude [{unit}]", "phase [°]"],
-                   weights=(0.6, 0.4), x_type="log")
+    figure = panels.rows(2, 560, "frequency [Hz]",
+                         ["amplitude [output units per m/s²]", "phase [°]"], weights=(0.6, 0.4),
+                         x_type="log")
     amplitude, phase = np.abs(curve.response), np.unwrap(np.angle(curve.response))
     frequency = curve.frequency_hz
     if curve.amplitude_interval is not None:
@@ -98,10 +97,10 @@ def bode_curves(frequency_hz, curves, colours=SERIES):
     return panels.finished(figure)
 
 
-def shades(count, first=(47, 134, 201), last=(217, 119, 43)):
-    """That many colours from one to another, for curves whose order matters."""
+def shades(count):
+    """That many colours from blue to orange, for curves whose order matters."""
     share = np.linspace(0, 1, count)[:, None]
-    mixed = np.round((1 - share) * first + share * last).astype(int)
+    mixed = np.round((1 - share) * (47, 134, 201) + share * (217, 119, 43)).astype(int)
     return [f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in mixed]
 
 
@@ -180,38 +179,33 @@ def mark_band(figure, band_hz):
     return figure
 
 
-def time_signals(time_s, signals, residual=None, unit="output units"):
+def time_signals(signals, residual):
     """Signals over time, and below them what is left.
 
     Parameters
     ----------
-    time_s : ndarray, shape (n,)
-    signals : dict of str to ndarray, shape (n,), or to a pair of them
-        NaN leaves a gap. A pair is times and values of a signal that was thinned before.
-    residual : ndarray, shape (n,), or dict of str to ndarray, optional
-        A dict where several signals have one each, by their names, arrays or pairs as well.
-    unit : str
+    signals : dict of str to pair of ndarray, shape (n,)
+        Times and values, each pair of a length of its own; NaN leaves a gap.
+    residual : pair of ndarray, or dict of str to such pairs
+        A dict where several signals have one each, by their names.
 
     Returns
     -------
     plotly.graph_objects.Figure
     """
-    def draw(values, row, name, colour, legend=True, width=1.4):
-        x, y = values if isinstance(values, tuple) else (time_s, values)
-        panels.signal(figure, x, y, row, name, colour, legend, width)
-    rows = 1 if residual is None else 2
-    labels = [f"output<br>[{unit}]", f"residual<br>[{unit}]"][:rows]
-    figure = panels.rows(rows, 280 + 200 * (rows - 1), "time [s]", labels,
-                         weights=(0.6, 0.4) if rows == 2 else None)
+    figure = panels.rows(2, 480, "time [s]", ["output<br>[output units]",
+                                              "residual<br>[output units]"], weights=(0.6, 0.4))
     colours = dict(zip(signals, (MEASURED, *SERIES)))
     for name, values in signals.items():
         # the measured signal shows on both sides of the model that is drawn upon it
-        draw(values, 1, name, colours[name], width=3 if colours[name] is MEASURED else 1.2)
+        panels.signal(figure, *values, 1, name, colours[name],
+                      width=3 if colours[name] is MEASURED else 1.2)
     if isinstance(residual, dict):
         for name, values in residual.items():
-            draw(values, 2, f"residual of the {name}", colours[name], legend=False)
-    elif residual is not None:
-        draw(residual, 2, "residual", RESIDUAL)
+            panels.signal(figure, *values, 2, f"residual of the {name}", colours[name],
+                          legend=False)
+    else:
+        panels.signal(figure, *residual, 2, "residual", RESIDUAL)
     return figure
 
 
@@ -271,18 +265,14 @@ def correlation(lags, values, bound, x_label="lag [samples]", y_label="correlati
     return panels.finished(figure)
 
 
-def lines(x, series, x_label, y_label, band=None, points=None, log=""):
-    """Lines over a common axis, with an interval and measured points where there are.
+def lines(x, series, x_label, y_label, log=""):
+    """Lines over a common axis.
 
     Parameters
     ----------
     x : ndarray, shape (m,)
     series : dict of str to ndarray, shape (m,)
     x_label, y_label : str
-    band : tuple of two ndarray, shape (m,), optional
-        Limits of a 95 % interval.
-    points : tuple of ndarray, shape (k,), optional
-        Places, values and, as a third, standard uncertainties.
     log : str
         Letters of the axes that are logarithmic: ``"x"``, ``"y"``, ``"xy"``.
 
@@ -291,13 +281,8 @@ def lines(x, series, x_label, y_label, band=None, points=None, log=""):
     plotly.graph_objects.Figure
     """
     figure = panels.rows(1, 380, x_label, [y_label], x_type="log" if "x" in log else "linear")
-    if band is not None:
-        panels.band(figure, x, *band, 1)
-    if points is not None:
-        panels.points(figure, points[0], points[1], 1, points[2] if len(points) > 2 else None)
-    alone = len(series) == 1 and band is None and points is None
     for (name, values), colour in zip(series.items(), SERIES):
-        panels.line(figure, *envelope(x, values), 1, name, colour, legend=not alone)
+        panels.line(figure, *envelope(x, values), 1, name, colour, legend=len(series) > 1)
     if "y" in log:
         figure.update_yaxes(type="log")
     return panels.finished(figure)

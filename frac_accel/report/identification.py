@@ -184,7 +184,7 @@ def _residual(section, seen, noise):
     def drawn(view):
         signals = dict(seen.signals[view])
         residual = signals.pop("residual")
-        return figures.time_signals(None, signals, residual)
+        return figures.time_signals(signals, residual)
     section.figure(drawn("whole"),
                    "Sensor's output, measured and by the model, and the residual"
                    + thinned(seen.samples, MOST_POINTS))

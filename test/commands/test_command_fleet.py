@@ -16,6 +16,7 @@ import fleet_rig
 import numpy as np
 import pytest
 
+import frac_accel
 from frac_accel.cli import main
 from frac_accel.diagnosis import Diagnosis
 
@@ -295,7 +296,7 @@ def test_workers_of_another_version_are_refused(drives, tmp_path, capsys, monkey
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None,
                                   silence_logs=50) as cluster:
-        monkeypatch.setattr("frac_accel.fleet.workers.ours", lambda: "99.0")
+        monkeypatch.setattr(frac_accel, "__version__", "99.0")
         line = refusal(capsys, "correct", drives / "bags", "-o", tmp_path, "--model",
                        drives / "model.yaml", "--scheduler", cluster.scheduler_address)
         assert "99.0" in line

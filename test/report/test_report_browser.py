@@ -71,11 +71,11 @@ def test_every_kind_of_figure_is_drawn(tmp_path):
     page.section("All").figure(figures.bode(curve, points, modelled)).figure(
         figures.response_deviation(curve, points, modelled)).figure(
         figures.response_interval(curve)).figure(
-        figures.time_signals(time_s, {"a": signal, "b": -signal}, 0.1 * signal)).figure(
+        figures.time_signals({"a": (time_s, signal), "b": (time_s, -signal)},
+                             (time_s, 0.1 * signal))).figure(
         figures.spectra(frequency, {"a": frequency**-0.5}, level=0.05)).figure(
         figures.correlation(np.arange(50), rng.standard_normal(50) / 10, 0.2)).figure(
-        figures.lines(frequency, {"a": frequency}, "x", "y", (0.9 * frequency, 1.1 * frequency),
-                      (frequency[::20], frequency[::20], np.ones(10)), log="xy"))
+        figures.lines(frequency, {"a": frequency}, "x", "y", log="xy"))
     page.write(tmp_path / "page.html")
     dom, console = browser.open_page(tmp_path / "page.html")
     assert not console

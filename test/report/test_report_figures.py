@@ -43,7 +43,7 @@ def test_page_of_a_million_samples_is_small(tmp_path):
     time_s, signal = np.arange(n) / 2000.0, rng.standard_normal(n)
     page = Page("Long record")
     page.section("Signals").figure(figures.time_signals(
-        time_s, {"measured": signal, "model": 0.9 * signal}, 0.1 * signal))
+        {"measured": (time_s, signal), "model": (time_s, 0.9 * signal)}, (time_s, 0.1 * signal)))
     page.write(tmp_path / "r.html")
     assert (tmp_path / "r.html").stat().st_size < 8e6
 
