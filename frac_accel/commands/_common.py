@@ -5,7 +5,6 @@ What a verb works with is imported where it works: help and completion need none
 
 import argparse
 import contextlib
-import hashlib
 import json
 import math
 import os
@@ -16,7 +15,7 @@ from pathlib import Path
 
 from ..errors import BagError, DesignError, FracAccelError
 from ..io.outputs import guard, sweep, write_text
-from ..io.regular_file import open_regular
+from ..io.regular_file import sha256_of
 from ..io.topics import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC
 from ..report import require_plotly
 
@@ -237,12 +236,7 @@ def provenance(bag, command):
     from .. import __version__
     path = Path(bag)
     files = sorted([*path.glob("*.mcap"), *path.glob("*.db3*")]) if path.is_dir() else [path]
-    digest = hashlib.sha256()
-    for file in files:
-        with open_regular(file) as stream:
-            while part := stream.read(1 << 20):
-                digest.update(part)
-    return {"bag": printable(path.name), "sha256": digest.hexdigest(),
+    return {"bag": printable(path.name), "sha256": sha256_of(*files),
             "command": printable(command), "frac_accel_version": __version__}
 
 

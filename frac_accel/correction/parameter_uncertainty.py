@@ -22,7 +22,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import ModelError
-from ..model.effects import IDENTIFIED
 from ..model.parameters import number
 from ..signals.parallel_filter import FilterState
 from .fitting import TAIL
@@ -44,8 +43,6 @@ _THINNED = 2
 _DRAWS = 400
 # Relative change of a response that is none.
 _ROUNDING = 1e-9
-# Step of a central difference, of the parameter.
-_STEP = 1e-5
 _MOST_FREQUENCIES = 2000
 
 
@@ -256,15 +253,11 @@ def _parts(axis):
 def _part_slopes(uncertain, parts):
     """Derivatives of the parts' coefficients by the parameters, shape (n_parts, p)."""
     result = np.zeros((len(parts), len(uncertain.values)))
-    for i, value in enumerate(uncertain.values if parts else ()):
-        step = np.zeros(len(uncertain.values))
-        step[i] = _STEP * (abs(value) or 1.0)
-        beside = [(sign, uncertain.at(uncertain.values + sign * step)) for sign in (-1, 1)]
-        beside = [(sign, axis or uncertain.axis, axis is not None) for sign, axis in beside]
-        length = step[i] * sum(is_there for *_, is_there in beside)
-        if length:
-            result[:, i] = sum(sign * _part_values(axis, uncertain, parts)
-                               for sign, axis, _ in beside) / length
+    for i in range(len(uncertain.values) if parts else 0):
+        above, below, apart = uncertain.beside(i)
+        if apart:
+            result[:, i] = (_part_values(above, uncertain, parts)
+                            - _part_values(below, uncertain, parts)) / apart
     return result
 
 
@@ -287,7 +280,7 @@ def _changes(uncertain, s, offset_gain, parts):
     method : str
     nonlinearity : float
     """
-    from ..uncertainty.parameters import LINEAR
+    from ..uncertainty.parameters import LINEAR, offset_of
     place = uncertain.names.index("offset") if "offset" in uncertain.names else None
 
     def change(drawn):
@@ -305,18 +298,13 @@ def _changes(uncertain, s, offset_gain, parts):
     changes = np.array([1 / uncertain.ratio(one, s) - 1 for one in drawn])
     constants, shares = np.zeros(_DRAWS), np.zeros((_DRAWS, len(parts)))
     if place is not None:
-        constants = offset_gain * np.array([_offset(one) - uncertain.values[place]
+        constants = offset_gain * np.array([offset_of(one) - uncertain.values[place]
                                             for one in drawn])
     if parts:
         shares = np.array([_part_values(one, uncertain, parts) for one in drawn])
         shares -= _part_values(uncertain.axis, uncertain, parts)
     share = np.sqrt(_DRAWS)
     return changes / share, constants / share, shares / share, "Monte Carlo", nonlinearity
-
-
-def _offset(axis):
-    return sum(effect.offset for effect in axis.effects
-               if isinstance(effect, IDENTIFIED["offset"]))
 
 
 def _principal(changes, constants, shares, unit):

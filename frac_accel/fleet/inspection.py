@@ -1,16 +1,12 @@
 """What a bag is, before it is worked on: its content's hash, its date, its sensor."""
 
 import datetime
-import hashlib
 from pathlib import Path
 
 from ..errors import FracAccelError
 from ..io.bag import BagReader
-from ..io.regular_file import open_regular
+from ..io.regular_file import sha256_of
 from .places import at_hand
-
-# Bytes that are read at a time.
-_PART = 1 << 20
 
 
 def inspect(request):
@@ -44,12 +40,8 @@ def inspect(request):
 
 def content_hash(path):
     """SHA-256 of a file, or of all bags of a folder one after the other."""
-    path, digest = Path(path), hashlib.sha256()
-    for file in sorted(path.glob("*.mcap")) if path.is_dir() else [path]:
-        with open_regular(file) as stream:
-            while part := stream.read(_PART):
-                digest.update(part)
-    return digest.hexdigest()
+    path = Path(path)
+    return sha256_of(*(sorted(path.glob("*.mcap")) if path.is_dir() else [path]))
 
 
 def _first_sample(path, topic):

@@ -110,28 +110,26 @@ class Learnt:
         size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         self.mean = np.linalg.lstsq(gram / np.outer(size, size), shared / size,
                                     rcond=1e-9)[0] / size
-        power = _left(merged, self.mean)
-        self.variance = float(np.sum(power) / np.sum(merged.count))
+        self.variance = float(np.sum(self.left(merged)) / np.sum(merged.count))
         self.inflation = np.maximum(np.mean(self._standard(merged)**2, axis=0), 1e-12)
 
     def scores(self, merged):
         """Scores of each block, shape (k, p + 1): none where a direction is not there."""
         moved = np.abs(self._standard(merged)) / np.sqrt(self.inflation)
-        size = np.log(np.maximum(_left(merged, self.mean), 1e-300)
+        size = np.log(np.maximum(self.left(merged), 1e-300)
                       / np.maximum(merged.count, 1.0) / self.variance)
         return np.c_[moved, np.abs(size)]
+
+    def left(self, merged):
+        """Power of the residual without the model's own error, shape (k,)."""
+        return (merged.power - 2 * merged.shared @ self.mean
+                + np.einsum("i,kij,j->k", self.mean, merged.gram, self.mean))
 
     def _standard(self, merged):
         """Sums along each direction, over those of white noise."""
         own = np.diagonal(merged.gram, axis1=1, axis2=2)
         return ((merged.shared - merged.gram @ self.mean)
                 / np.sqrt(np.maximum(own * self.variance, 1e-300)) * (own > 0))
-
-
-def _left(merged, mean):
-    """Power of the residual without the model's own error."""
-    return (merged.power - 2 * merged.shared @ mean
-            + np.einsum("i,kij,j->k", mean, merged.gram, mean))
 
 
 def _bet(p_values):

@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 from ..errors import FracAccelError
+from ..io.announcement import sync
 
 _JOURNAL, _PARTIAL = "journal.jsonl", ".partial"
 
@@ -81,12 +82,7 @@ class Journal:
 
     def complete(self, path):
         """Give such a folder its name, once it is on the disk; returns it."""
-        for file in [*path.iterdir(), path]:
-            descriptor = os.open(file, os.O_RDONLY)
-            try:
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
+        sync(*path.iterdir(), path)
         target = path.with_name(path.name.removesuffix(_PARTIAL))
         os.rename(path, target)
         self._keep_small(target)

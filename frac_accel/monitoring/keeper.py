@@ -1,10 +1,10 @@
 """From a watched sensor to what is said and done: diagnosis, trial, another model, and back."""
 
-import hashlib
 import time
 from pathlib import Path
 
 from ..errors import FracAccelError
+from ..io.regular_file import sha256_of
 from ..model import SensorModel
 from .errand import Errand
 from .journal import Journal
@@ -69,7 +69,7 @@ class Keeper:
         self._errand = self._candidate = self._asked = None
         self._reason, self._last_s = "", time.monotonic()
         self._is_told = self._is_examined = False
-        self._note("started", model=self.model_file, sha256=_hash(self.model_file), apply=apply)
+        self._note("started", model=self.model_file, sha256=sha256_of(self.model_file), apply=apply)
 
     @property
     def state(self):
@@ -159,7 +159,7 @@ class Keeper:
         if reason:
             self._note("refused", model=model_file, reason=reason)
             return
-        self._note(step, model=model_file, before=self.model_file, sha256=_hash(model_file),
+        self._note(step, model=model_file, before=self.model_file, sha256=sha256_of(model_file),
                    gain=self.trial.gain if self.trial else None)
         self.model_file, self._candidate, self.trial = model_file, None, None
         self.latest, self._is_told, self._is_examined = {}, False, False
@@ -208,7 +208,3 @@ class Keeper:
 
     def _note(self, step, **what):
         self.notes.append(self.journal.note(step, **what))
-
-
-def _hash(path):
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()

@@ -48,8 +48,7 @@ def onset(blocks, learnt):
     Onset
     """
     shared = blocks.shared - blocks.gram @ learnt.mean
-    power = np.maximum(blocks.power - 2 * blocks.shared @ learnt.mean
-                       + np.einsum("i,kij,j->k", learnt.mean, blocks.gram, learnt.mean), 1e-300)
+    power = np.maximum(learnt.left(blocks), 1e-300)
     time = np.arange(len(power), dtype=float)
     places = np.arange(_SIDE, len(power) - _SIDE)
     inflation = max(float(np.max(learnt.inflation)), 1.0)

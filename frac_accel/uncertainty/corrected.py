@@ -6,10 +6,9 @@ import numpy as np
 
 from ..errors import FracAccelError
 from ..model import AXES
-from ..model.effects import IDENTIFIED
 from ..signals.convolution import Convolution
 from ..simulation import static_gain
-from .parameters import LINEAR, UncertainAxis
+from .parameters import LINEAR, UncertainAxis, offset_of
 
 # Draws of the parameters.
 _DRAWS = 400
@@ -109,7 +108,7 @@ def _axis(uncertain, values, rate):
         if gain:
             result += level * (1 / uncertain.ratio(drawn, steady)[0].real - 1)
         if offset is not None:
-            result += by_offset * (_offset(drawn) - uncertain.values[offset])
+            result += by_offset * (offset_of(drawn) - uncertain.values[offset])
         return result
 
     nonlinearity = uncertain.nonlinearity(change, whole=True)
@@ -124,8 +123,3 @@ def _axis(uncertain, values, rate):
         return np.maximum(variance, 0), "first order", nonlinearity
     variance = np.mean([np.square(change(drawn)) for drawn in uncertain.draws(_DRAWS)], axis=0)
     return variance, "Monte Carlo", nonlinearity
-
-
-def _offset(model):
-    return sum(effect.offset for effect in model.effects
-               if isinstance(effect, IDENTIFIED["offset"]))

@@ -151,17 +151,22 @@ class UncertainAxis:
             if name == "delay_s":
                 result[i] = -s
             elif name != "offset":
-                step = np.zeros(len(self.values))
-                step[i] = _STEP * (abs(self.values[i]) or 1.0)
-                above, below = self.at(self.values + step), self.at(self.values - step)
-                if above is None and below is None:
+                above, below, apart = self.beside(i)
+                if not apart:
                     raise ModelError(f"{name}: {self.values[i]:g} is outside its range")
-                # at the edge of stability only one side can be had
-                step_length = step[i] * ((above is not None) + (below is not None))
-                upper, lower = (model or self.axis for model in (above, below))
-                result[i] = np.log(upper.transfer_function(s) / lower.transfer_function(s)) \
-                    / step_length
+                result[i] = np.log(above.transfer_function(s) / below.transfer_function(s)) / apart
         return result
+
+    def beside(self, i):
+        """AxisModels with parameter i a little above and below, and how far apart they are.
+
+        At the edge of stability only one side can be had, and the axis itself stands for the other.
+        """
+        step = np.zeros(len(self.values))
+        step[i] = _STEP * (abs(self.values[i]) or 1.0)
+        above, below = self.at(self.values + step), self.at(self.values - step)
+        return (above or self.axis, below or self.axis,
+                step[i] * ((above is not None) + (below is not None)))
 
     def ratio(self, model, s):
         """Response of a drawn AxisModel over that of the axis at `s`, delay included."""
@@ -274,6 +279,12 @@ def for_axis(axis, names, matrix):
         raise ModelError(f"axes.{axis}: the covariance says nothing of this axis")
     names = [names[i].removeprefix(f"axes.{axis}.") for i in places]
     return names, matrix[np.ix_(places, places)], bool(wanted)
+
+
+def offset_of(axis):
+    """Offset of an AxisModel [output units]."""
+    return sum(effect.offset for effect in axis.effects
+               if isinstance(effect, IDENTIFIED["offset"]))
 
 
 def _owner(name):
