@@ -37,7 +37,7 @@ MANY = ((50, 100.0, 0.5), (8, 1000.0, 0.5))
 _MOST_MB = 150
 # Beyond the budget [ms].
 _MOST_LATE_MS = 5.0
-_WARM_UP_S, _SECONDS = 3.0, 8.0
+_WARM_UP_S, _SECONDS, _IDLE_S = 3.0, 8.0, 10.0
 
 
 def pass_through_many(command, count, rate_hz, design=None):
@@ -103,12 +103,12 @@ def many_command(folder, model_file, count, rate_hz, budget_ms):
             str(file)]
 
 
-def idle_cores(command, seconds=10.0):
+def idle_cores(command):
     """Share of a core that a node takes without any message."""
     with _process(command, _environment(), subprocess.DEVNULL) as node:
         time.sleep(4.0)
         cpu_s, start_s = machine.cpu_time_s(node.pid), time.monotonic()
-        time.sleep(seconds)
+        time.sleep(_IDLE_S)
         if node.poll() is not None:
             raise FracAccelError("the corrector has ended")
         return (machine.cpu_time_s(node.pid) - cpu_s) / (time.monotonic() - start_s)

@@ -14,7 +14,7 @@ import threading
 from pathlib import Path
 
 from ..errors import BagError, DesignError, FracAccelError
-from ..io.outputs import guard, sweep, write_text
+from ..io.outputs import guard, say, sweep, write_text
 from ..io.regular_file import sha256_of
 from ..io.topics import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC
 from ..report import require_plotly
@@ -181,6 +181,12 @@ def require_report(path):
     """Refuse a report that could not be made, before the work that it is to tell of."""
     if path is not None:
         require_plotly()
+
+
+def write_page(page, path):
+    """Write a report, and say so."""
+    page.write(path)
+    say(f"{path}: written")
 
 
 def progress(total, unit="msg"):

@@ -7,7 +7,6 @@ are. Samples that cannot be corrected (the filter's warm-up, bad stamps or value
 from pathlib import Path
 
 from ..errors import BagError
-from ..io.outputs import say
 from ..io.topics import CORRECTED_TOPIC
 from ._common import (
     add_bag,
@@ -23,6 +22,7 @@ from ._common import (
     progress,
     require_report,
     write_json,
+    write_page,
 )
 
 EXAMPLES = """
@@ -99,8 +99,7 @@ def run(arguments):
     if arguments.report:
         # whoever wants no page need not wait for what draws it
         from ._correct_page import page
-        page(sink.kept(), reader, corrector, arguments).write(arguments.report)
-        say(f"{arguments.report}: written")
+        write_page(page(sink.kept(), reader, corrector, arguments), arguments.report)
     write_json(arguments.json, {"output": str(arguments.output), "counters": counters,
                                 "filters": summary, "warnings": warnings})
 

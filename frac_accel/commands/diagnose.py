@@ -17,6 +17,7 @@ from ._common import (
     require_report,
     share_done,
     write_json,
+    write_page,
 )
 
 # Share of what is left from which a part of the error budget is told.
@@ -85,9 +86,8 @@ def run(arguments):
     if arguments.report:
         from ..report.diagnosis import diagnosis_page
         page = diagnosis_page(found, source)
-        page.write(arguments.report)
+        write_page(page, arguments.report)
         source = page.provenance
-        say(f"{arguments.report}: written")
     write_json(arguments.json, {**result, "provenance": source})
 
 

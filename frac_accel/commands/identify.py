@@ -20,6 +20,7 @@ from ._common import (
     require_report,
     share_done,
     write_json,
+    write_page,
 )
 
 EXAMPLES = """
@@ -66,9 +67,8 @@ def run(arguments):
     if arguments.report:
         from ..report.identification import identification_page
         page = identification_page(result, source)
-        page.write(arguments.report)
+        write_page(page, arguments.report)
         source = page.provenance
-        say(f"{arguments.report}: written")
     write_json(arguments.json, {**result.as_dict(), "provenance": source})
 
 

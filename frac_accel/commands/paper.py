@@ -2,7 +2,6 @@
 again, its claims audited, and its experiment done properly on the bench's bags.
 """
 
-from ..io.outputs import say
 from ..io.shared_files import shared_folder
 from ._common import (
     add_json,
@@ -11,6 +10,7 @@ from ._common import (
     require_report,
     share_done,
     write_json,
+    write_page,
 )
 
 BAGS = shared_folder("bags")
@@ -40,8 +40,7 @@ def run(arguments):
     print(table(result))
     if arguments.report:
         from ..report.paper import paper_page
-        paper_page(result, _provenance(arguments, result)).write(arguments.report)
-        say(f"{arguments.report}: written")
+        write_page(paper_page(result, _provenance(arguments, result)), arguments.report)
     write_json(arguments.json, result.as_dict())
 
 
@@ -66,9 +65,6 @@ def table(result):
 def _provenance(arguments, result):
     command = "frac_accel paper" + (" --quick" if arguments.quick else "")
     if result.study is None:
-        full = {"command": command}
-    else:
-        first, *others = (provenance(bag, command) for bag in result.study.bags)
-        full = {**first, "bag": [first["bag"], *(other["bag"] for other in others)],
-                "sha256": [first["sha256"], *(other["sha256"] for other in others)]}
-    return full
+        return {"command": command}
+    all_bags = [provenance(bag, command) for bag in result.study.bags]
+    return {**all_bags[0], **{key: [each[key] for each in all_bags] for key in ("bag", "sha256")}}

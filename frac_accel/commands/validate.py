@@ -7,7 +7,6 @@ import math
 import sys
 
 from ..errors import DesignError, FracAccelError
-from ..io.outputs import say
 from ._common import (
     add_bag,
     add_filter,
@@ -23,6 +22,7 @@ from ._common import (
     read_temperature_at,
     require_report,
     write_json,
+    write_page,
 )
 
 _HEADING = "           band [Hz]   NRMSE [%]  amplitude [%]  phase [deg]   peak [%]"
@@ -67,8 +67,7 @@ def run(arguments):
     for words in result.words:
         print(f"data: {words}")
     if arguments.report:
-        _page(result, model, arguments).write(arguments.report)
-        say(f"{arguments.report}: written")
+        write_page(_page(result, model, arguments), arguments.report)
     write_json(arguments.json, result.as_dict())
 
 

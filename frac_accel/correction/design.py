@@ -217,9 +217,11 @@ def require_wishes(bandwidth_hz=None, max_delay_s=None, lowest_hz=None, toleranc
 def _parameter_uncertainty(model, problems, delay, axes):
     """`ParameterUncertainty` of each axis, or None and why there is none."""
     known = {}
+    says_of_axes = any("axes." in str(model.metadata.get(key))
+                       for key in ("covariance", "uncertainties"))
     for name, problem, linear in zip(AXES, problems, axes):
         # axes alike share the filters, unless the file says something of one alone
-        alike = problem, model.axis(name), name if _says_of_axes(model) else ""
+        alike = problem, model.axis(name), name if says_of_axes else ""
         if alike not in known:
             try:
                 result = design_parameter_uncertainty(model, name, problem, delay, linear), ""
@@ -227,10 +229,6 @@ def _parameter_uncertainty(model, problems, delay, axes):
                 result = None, str(error)
             known[alike] = result
         yield known[alike]
-
-
-def _says_of_axes(model):
-    return any("axes." in str(model.metadata.get(key)) for key in ("covariance", "uncertainties"))
 
 
 def _delay_with_terms(delay, nonlinear, rate, max_delay_s):

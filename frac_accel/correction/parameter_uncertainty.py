@@ -43,6 +43,7 @@ _THINNED = 2
 _DRAWS = 400
 # Relative change of a response that is none.
 _ROUNDING = 1e-9
+# Frequencies at which filters are fitted, at most.
 _MOST_FREQUENCIES = 2000
 
 

@@ -162,11 +162,7 @@ def _together(rows, owners, given):
 def _listed(rows, owners):
     entries = [{"bag": row["bag"], "page": row["page"], "vehicle": owner, "axis": row["axis"],
                 "start_ns": row["start_ns"], "verdict": row["verdict"],
-                "nrmse": _first(row["baseline_nrmse"], row["nrmse"]),
+                "nrmse": row["nrmse"] if row["baseline_nrmse"] is None else row["baseline_nrmse"],
                 "causes": row["causes"] or []} for row, owner in zip(rows, owners)]
     entries.sort(key=lambda entry: (entry["verdict"] in _UNREMARKABLE, -(entry["nrmse"] or 0.0)))
     return entries[:_MOST_LISTED]
-
-
-def _first(*values):
-    return next((value for value in values if value is not None), None)

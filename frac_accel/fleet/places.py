@@ -88,7 +88,8 @@ def _bags_at(fs, path):
 def _bag(fs, path, infos):
     changed = max((str(info.get("mtime") or info.get("LastModified") or info.get("ETag")
                        or info.get("created") or "") for info in infos), default="")
-    return Bag(_url(fs, path), sum(info["size"] or 0 for info in infos), changed)
+    url = path if is_local(fs) else fs.unstrip_protocol(path)
+    return Bag(url, sum(info["size"] or 0 for info in infos), changed)
 
 
 def is_local(fs):
@@ -101,10 +102,6 @@ def file_system(url):
     """File system of a URL, and the path there."""
     from fsspec.core import url_to_fs
     return url_to_fs(url)
-
-
-def _url(fs, path):
-    return path if is_local(fs) else fs.unstrip_protocol(path)
 
 
 @contextlib.contextmanager

@@ -72,10 +72,6 @@ def correction_page(title, seen, summary, provenance=None, model=None, metrics=N
         Whose uncertainty the response after correction has.
     metrics : dict of str to ErrorMetrics, optional
         Of the first axis, by what they judge.
-
-    Returns
-    -------
-    Page
     """
     page = Page(title, provenance)
     section = page.section("Result")

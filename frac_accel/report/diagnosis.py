@@ -3,9 +3,8 @@
 from ..budget import WORDS
 from ..model.parameters import parameter_fields
 from .diagnosis_figures import discrepancy
-from .figures import COVERAGE_FACTOR
 from .page import Page
-from .quantity import percent, rounded, scaled, written
+from .quantity import cells, percent, rounded, written
 from .rivals import rivals
 from .signals import sentence
 
@@ -26,10 +25,6 @@ def diagnosis_page(found, provenance=None):
     found : Diagnosis
     provenance : dict, optional
         As for `Page`.
-
-    Returns
-    -------
-    Page
     """
     seen = found.evidence
     axis = f", axis {seen.axis}" if seen else ""
@@ -128,15 +123,8 @@ def _causes(section, found):
     parameters, gains = [], []
     for finding in found.findings:
         for name, entry in finding.as_dict()["parameters"].items():
-            factor, unit = scaled(entry["value"], entry["unit"])
-            value = entry["value"] if isinstance(entry["value"], str) else factor * entry["value"]
-            std = factor * entry["std"]
-            shown, uncertainty = rounded(value, std)
-            half = COVERAGE_FACTOR * std
-            interval = (f"{rounded(value - half, std)[0]} to {rounded(value + half, std)[0]}"
-                        if uncertainty else "–")
-            parameters.append([finding.cause, name, shown, uncertainty or "–", interval,
-                               unit or "1"])
+            parameters.append([finding.cause, name,
+                               *cells(entry["value"], entry["std"], entry["unit"])])
         g = finding.gain
         gains.append([finding.cause, f"{g.before:.4g}", f"{g.after:.4g}", f"{g.reduction:.2%}",
                       f"{g.ci95[0]:.2%} to {g.ci95[1]:.2%}", f"{finding.confidence:.3f}"])

@@ -4,13 +4,16 @@ import numpy as np
 
 from ..diagnosis.evidence import MOST_POINTS
 from . import figures
-from .signals import thinned
+from .signals import over_time
 
 
 def discrepancy(section, found):
     """Fill a section with the figures."""
     seen = found.evidence
-    _in_time(section, seen)
+    over_time(section, seen,
+              lambda view: figures.time_signals(view["output"], view["residual"]), MOST_POINTS,
+              "Sensor's output, measured and simulated from the reference, and the residuals "
+              "(measured less simulated)")
     _in_frequency(section, seen, found.baseline["noise_rms"])
     section.figure(
         figures.lines(seen.by_size["x"], seen.by_size["rms"], "output's distance from its "
@@ -22,17 +25,6 @@ def discrepancy(section, found):
                       "residual's RMS [output units]", log="y"),
         "Residual by time. What changes along this line hints at a drift, at temperature, at a "
         "clock, or at a change of the excitation.")
-
-
-def _in_time(section, seen):
-    whole = seen.signals["whole"]
-    section.figure(figures.time_signals(whole["output"], whole["residual"]),
-                   "Sensor's output, measured and simulated from the reference, and the residuals "
-                   "(measured less simulated)" + thinned(seen.samples, MOST_POINTS))
-    part = seen.signals.get("close_up")
-    if part:
-        section.figure(figures.time_signals(part["output"], part["residual"]),
-                       f"The {seen.close_up_samples} samples with the strongest output.")
 
 
 def _in_frequency(section, seen, noise_rms):

@@ -45,10 +45,6 @@ def bode(curve, points=None, modelled=None):
     points : ResponsePoints, optional
     modelled : ndarray of complex, shape (k,)
         The model's response at the frequencies of the points.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
     """
     figure = panels.rows(2, 560, "frequency [Hz]",
                          ["amplitude [output units per m/s²]", "phase [°]"], weights=(0.6, 0.4),
@@ -85,10 +81,6 @@ def bode_curves(frequency_hz, curves, colours=SERIES):
         Magnitude [dB] and phase [degree].
     colours : sequence of str
         At least as many as there are curves.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
     """
     figure = panels.rows(2, 520, "frequency [Hz]", ["magnitude [dB]", "phase [°]"], x_type="log")
     for (name, parts), colour in zip(curves.items(), colours):
@@ -113,10 +105,6 @@ def response_deviation(curve, points, modelled):
     points : ResponsePoints
     modelled : ndarray of complex, shape (k,)
         The model's response at the frequencies of the points.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
     """
     figure = panels.rows(2, 520, "frequency [Hz]", ["amplitude [%]", "phase [°]"], x_type="log")
     ratio = points.response / modelled
@@ -143,10 +131,6 @@ def response_interval(curve):
     ----------
     curve : ResponseCurve
         With its intervals.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
     """
     figure = panels.rows(2, 420, "frequency [Hz]", ["amplitude [± %]", "phase [± °]"], x_type="log")
     low, high = curve.amplitude_interval
@@ -188,10 +172,6 @@ def time_signals(signals, residual):
         Times and values, each pair of a length of its own; NaN leaves a gap.
     residual : pair of ndarray, or dict of str to such pairs
         A dict where several signals have one each, by their names.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
     """
     figure = panels.rows(2, 480, "time [s]", ["output<br>[output units]",
                                               "residual<br>[output units]"], weights=(0.6, 0.4))
@@ -223,10 +203,6 @@ def spectra(frequency_hz, densities, unit="output units", level=None,
         Density of white noise, drawn as a line.
     colours : sequence of str
         Of the densities in their order.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
     """
     figure = panels.rows(1, 420, "frequency [Hz]", [f"density [{unit}/√Hz]"], x_type="log")
     above = frequency_hz > 0
@@ -249,10 +225,6 @@ def correlation(lags, values, bound, x_label="lag [samples]", y_label="correlati
     bound : float or ndarray, shape (m,)
         Half-width of the interval about zero.
     x_label, y_label : str
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
     """
     figure = panels.rows(1, 320, x_label, [y_label])
     bound = np.broadcast_to(bound, np.shape(lags))
@@ -275,10 +247,6 @@ def lines(x, series, x_label, y_label, log=""):
     x_label, y_label : str
     log : str
         Letters of the axes that are logarithmic: ``"x"``, ``"y"``, ``"xy"``.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
     """
     figure = panels.rows(1, 380, x_label, [y_label], x_type="log" if "x" in log else "linear")
     for (name, values), colour in zip(series.items(), SERIES):

@@ -20,10 +20,6 @@ def fleet_page(seen, command=""):
     seen : Overview
         Plain data: see `frac_accel.fleet.overview`.
     command : str
-
-    Returns
-    -------
-    Page
     """
     page = Page(f"Fleet: {seen.verb} of {seen.bags} bags", {"command": command})
     glance = page.section("At a glance")

@@ -7,8 +7,8 @@ from ..identification.evidence import MOST_POINTS
 from ..uncertainty import response_uncertainty
 from . import figures
 from .page import Page
-from .quantity import left_open_by, percent, rounded, scaled, written
-from .signals import sentence, thinned
+from .quantity import cells, left_open_by, percent, written
+from .signals import over_time, sentence
 
 # Frequencies of the drawn response.
 _FREQUENCIES = 400
@@ -24,10 +24,6 @@ def identification_page(result, provenance=None):
     result : Identification
     provenance : dict, optional
         As for `Page`.
-
-    Returns
-    -------
-    Page
     """
     page = Page(f"Identification: {result.structure}, axis {result.evidence.axis}", provenance)
     _summary(page.section("Result"), result)
@@ -67,16 +63,10 @@ def _parameters(section, result):
         if name in left_open:
             rows.append([name, "open: not determined", "–", "–", "–", entry["unit"]])
             continue
-        factor, unit = scaled(entry["value"], entry["unit"])
-        value, std = factor * entry["value"], factor * entry["std"]
-        shown, uncertainty = rounded(value, std)
-        half = figures.COVERAGE_FACTOR * std
-        known = bool(uncertainty)
-        rows.append([
-            name, shown, uncertainty or "–",
-            percent(std / abs(value)) if known and value else "–",
-            f"{rounded(value - half, std)[0]} to {rounded(value + half, std)[0]}" if known else "–",
-            unit or "1"])
+        value, std = entry["value"], entry["std"]
+        shown, uncertainty, *others = cells(value, std, entry["unit"])
+        relative = percent(std / abs(value)) if uncertainty != "–" and value else "–"
+        rows.append([name, shown, uncertainty, relative, *others])
     section.table(["parameter", "value", "standard uncertainty", "relative",
                    "95 % interval (k = 2)", "unit"], rows,
                   "Estimates. The uncertainties allow for a residual that is not white; they do "
@@ -143,7 +133,9 @@ def _response(section, result):
     def add(figure, caption):
         section.figure(figures.mark_band(figure, (low, high)), caption)
     add(figures.bode(curve, points, modelled),
-        f"Frequency response of the model{interval}" + (_measured(points) if points else ".")
+        f"Frequency response of the model{interval}" + (
+            f", and measured without a model at {len(points)} frequencies: {points.method}."
+            if points else ".")
         + f" Beyond the dashed lines, {low:.4g} Hz and {high:.4g} Hz, the model is extrapolated.")
     if certain:
         add(figures.response_interval(curve),
@@ -157,10 +149,6 @@ def _response(section, result):
         section.text(sentence(points.distortion["words"]))
     if result.frequency_domain:
         _frequency_domain(section, result)
-
-
-def _measured(points):
-    return f", and measured without a model at {len(points)} frequencies: {points.method}."
 
 
 def _frequency_domain(section, result):
@@ -182,15 +170,11 @@ def _frequency_domain(section, result):
 
 def _residual(section, seen, noise):
     def drawn(view):
-        signals = dict(seen.signals[view])
+        signals = dict(view)
         residual = signals.pop("residual")
         return figures.time_signals(signals, residual)
-    section.figure(drawn("whole"),
-                   "Sensor's output, measured and by the model, and the residual"
-                   + thinned(seen.samples, MOST_POINTS))
-    if "close_up" in seen.signals:
-        section.figure(drawn("close_up"),
-                       f"The {seen.close_up_samples} samples with the strongest output.")
+    over_time(section, seen, drawn, MOST_POINTS,
+              "Sensor's output, measured and by the model, and the residual")
     density = seen.density
     section.figure(
         figures.spectra(density["frequency_hz"], {"measured output": density["output"],

@@ -21,10 +21,6 @@ def paper_page(result, provenance=None):
     result : PaperResult
     provenance : dict, optional
         As for `Page`.
-
-    Returns
-    -------
-    Page
     """
     page = Page("Accelerometers with fractional orders: the seed paper reproduced and audited",
                 provenance)

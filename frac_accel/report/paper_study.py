@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..identification.judge.residual_tests import p_words
-from ..paper.study.answer import rival
+from ..paper.study.answer import factor, rival
 from ..paper.study.candidates import CLASSICAL, FRACTIONAL
 from ..paper.study.map import BANDS_HZ, NOISE_DB, ORDERS, SEEDS, VERDICTS
 from ..paper.study.sweep import best
@@ -141,12 +141,11 @@ def _swept(section, study):
     rows = []
     for result in swept.values():
         one, both = best(result.by_damping_order), best(result.by_table_4)
-        fit = result.fitted[FRACTIONAL].fit
-        std = fit.std[fit.names.index("damping_order")]
+        order, std = result.fitted[FRACTIONAL].order
         free = result.judged[FRACTIONAL]
         rows.append([result.words, f"{one.v1:g}", f"{100 * one.judged.rms:.3g}",
                      f"{both.v1:g} and {both.v2:g}", f"{100 * both.judged.rms:.3g}",
-                     f"{fit['damping_order']:.4f} ± {std:.1g}", f"{100 * free.rms:.3g}"])
+                     f"{order:.4f} ± {std:.1g}", f"{100 * free.rms:.3g}"])
     section.table(["sensor", "swept", "error [%]", "Table 4", "error [%]", "optimised",
                    "error [%]"], rows,
                   "Orders chosen by the smallest residual on the record that was fitted, and their "
@@ -208,7 +207,7 @@ def _map(section, study):
             for noise in NOISE_DB:
                 cell = cells[order, lagging, noise, band]
                 low, high = cell.gain_interval
-                row.append(f"{cell.verdict} ({_factor(low)} to {_factor(high)})")
+                row.append(f"{cell.verdict} ({factor(low)} to {factor(high)})")
             rows.append(row)
         section.table(["sensor's order", *map(_noise, NOISE_DB)], rows,
                       "Verdicts, and 95 % intervals of the gain's geometric mean over the records; "
@@ -217,7 +216,3 @@ def _map(section, study):
 
 def _noise(level_db):
     return f"noise {100 * 10**(-level_db / 20):g} %"
-
-
-def _factor(value):
-    return f"{value:.0f}" if value >= 100 else f"{value:.2g}"

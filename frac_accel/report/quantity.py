@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 from ..model.parameters import parameter_fields
+from .panels import COVERAGE_FACTOR
 
 # What numbers of these units are given a prefix for, so that nobody counts zeros.
 _PREFIXED = ("s", "Hz")
@@ -135,6 +136,25 @@ def rounded(value, std):
                 f"{std * scale:.{places}f}e{exponent:+03d}")
     places = max(digits, 0)
     return f"{round(value, digits):.{places}f}", f"{round(std, digits):.{places}f}"
+
+
+def cells(value, std, unit):
+    """Cells of a table for an estimate: value, standard uncertainty, 95 % interval (k = 2), unit.
+
+    Examples
+    --------
+    >>> cells(0.00129994, 1.1e-7, "s")
+    ['1.29994', '0.00011', '1.29972 to 1.30016', 'ms']
+    >>> cells("bessel", 0.0, "1")
+    ['bessel', '–', '–', '1']
+    """
+    factor, shown_unit = scaled(value, unit)
+    value, std = value if isinstance(value, str) else factor * value, factor * std
+    shown, uncertainty = rounded(value, std)
+    if not uncertainty:
+        return [shown, "–", "–", shown_unit or "1"]
+    low, high = (rounded(value + sign * COVERAGE_FACTOR * std, std)[0] for sign in (-1, 1))
+    return [shown, uncertainty, f"{low} to {high}", shown_unit or "1"]
 
 
 def percent(share):

@@ -55,7 +55,7 @@ def find_definition(type_name: str) -> MessageDefinition:
 
 def _collect(name: str, parts: dict[str, str]) -> bool:
     """Add the text of a type and, depth first, of all types that it contains."""
-    text = _text(name)
+    text = TEXTS.get(name) or _read_share(name, ".msg")
     if text is None:
         return False
     parts[name] = text
@@ -70,12 +70,6 @@ def _collect(name: str, parts: dict[str, str]) -> bool:
 def _short_name(field_type: str, package: str) -> str:
     match = _TYPE_NAME.match(field_type)
     return "/".join(match.groups()) if match else f"{package}/{field_type}"
-
-
-def _text(name: str) -> str | None:
-    if name in TEXTS:
-        return TEXTS[name]
-    return _read_share(name, ".msg")
 
 
 def _type_hash(name: str) -> str:

@@ -128,7 +128,8 @@ def _same_at_300(pole):
 def perfect_fit():
     """Figure 5's fit."""
     response = responses(models.identified())[2]
-    regressors, output = _two_parameters(response)
+    _, sine, output = sampled_sines(response, published.IDENTIFIED_AT_HZ)
+    regressors, output = np.stack([sine[1:], sine[:-1]], axis=1), output[1:]
     left = output - regressors @ np.linalg.lstsq(regressors, output, rcond=None)[0]
     share = float(np.std(left) / np.std(output))
     return Claim(
@@ -139,11 +140,6 @@ def perfect_fit():
         "figure says nothing about other frequencies.",
         f"Two coefficients alone, those of the present and the last input sample, leave "
         f"{share:.1e} of the signal.", {"residual_over_signal": share})
-
-
-def _two_parameters(response):
-    _, sine, output = sampled_sines(response, published.IDENTIFIED_AT_HZ)
-    return np.stack([sine[1:], sine[:-1]], axis=1), output[1:]
 
 
 def delay():

@@ -17,6 +17,8 @@ from .claim import (
     listed,
 )
 
+# Sine that the substituted model is played from rest.
+_FROM_REST_HZ = 100.0
 # Difference in percentage points up to which an order gives the printed errors.
 _SAME = 0.1
 _AT = published.FREQUENCY_HZ.index(published.IDENTIFIED_AT_HZ)
@@ -94,18 +96,18 @@ def unstable():
         "A1 is negative: as a continuous system the model is unstable. A frequency response can "
         "be drawn all the same; a simulation grows without bound.",
         f"Poles at {listed(poles.real, 4)} per second in the right half-plane; the motion doubles "
-        f"every {slowest:.2f} s. From rest, the error for a sine of 100 Hz is "
+        f"every {slowest:.2f} s. From rest, the error for a sine of {_FROM_REST_HZ:g} Hz is "
         f"{listed(grown)} % over the first {listed(durations, 0)} s. The package refuses it: "
         f"\"{refusal}\".",
         {"poles_per_s": poles.real.tolist(), "from_rest_s": list(durations),
          "from_rest_percent": grown})
 
 
-def _from_rest_percent(duration_s, frequency_hz=100.0):
+def _from_rest_percent(duration_s):
     """The paper's measure of the substituted model that starts from rest, by partial fractions."""
-    omega = 2 * np.pi * frequency_hz
+    omega = 2 * np.pi * _FROM_REST_HZ
     settled = models.substituted().transfer_function(np.array([1j * omega]))[0]
-    time_s, reference, output = sampled_sines(settled, frequency_hz, duration_s=duration_s)
+    time_s, reference, output = sampled_sines(settled, _FROM_REST_HZ, duration_s=duration_s)
     for pole in np.roots(published.G_DENOMINATOR):
         residue = (np.polyval(published.G_NUMERATOR, pole) * omega / (pole**2 + omega**2)
                    / np.polyval(np.polyder(published.G_DENOMINATOR), pole))

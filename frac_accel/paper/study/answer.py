@@ -39,7 +39,8 @@ def rival(result):
     return name, result.judged[name]
 
 
-def _factor(value):
+def factor(value):
+    """A ratio of two errors, to two digits."""
     return f"{value:.0f}" if value >= 100 else f"{value:.2g}"
 
 
@@ -50,20 +51,19 @@ def _percent(judged):
 
 def _fractional(result):
     own, (name, other) = result.judged[FRACTIONAL], rival(result)
-    order = result.fitted[FRACTIONAL].fit["damping_order"]
+    order, _ = result.fitted[FRACTIONAL].order
     ratio = other.rms / own.rms
     floor = "at the noise floor" if at_floor(own) else "above the noise floor"
     verdict = "helps" if ratio > 1 and not at_floor(other) else "does not help"
     return (f"Where the damping is fractional (order {order:.3f} on the bench), a fractional model "
             f"{verdict}: its held-out error from 100 to 500 Hz is {_percent(own)}, {floor}, and "
             f"that of the best classical model with as many parameters ({name}) {_percent(other)}, "
-            f"{_factor(ratio)} times as much.")
+            f"{factor(ratio)} times as much.")
 
 
 def _classical(result, cells):
     own, plain = result.judged[FRACTIONAL], result.judged[CLASSICAL]
-    fit = result.fitted[FRACTIONAL].fit
-    order, std = fit["damping_order"], fit.std[fit.names.index("damping_order")]
+    order, std = result.fitted[FRACTIONAL].order
     same = at_floor(own) and at_floor(plain)
     verdict = "does not help" if same or own.rms >= plain.rms else "helps"
     chosen = "is classical" if result.chosen == "oscillator" else f"is {result.chosen}"
@@ -100,8 +100,8 @@ def _where(cells):
                       lambda band: f"excited up to {band:g} Hz")
     return (f"Over the map it helps in {len(helping) - wrong} of {len(true)} combinations with a "
             f"fractional sensor ({by_noise}; {by_band}, the resonance being at {NATURAL_HZ:g} Hz), "
-            f"by a factor of {_factor(np.median(gains))} (median; {_factor(min(gains))} to "
-            f"{_factor(max(gains))}), and in {wrong} of {len(proper) - len(true)} with a classical "
+            f"by a factor of {factor(np.median(gains))} (median; {factor(min(gains))} to "
+            f"{factor(max(gains))}), and in {wrong} of {len(proper) - len(true)} with a classical "
             "one.")
 
 
@@ -117,8 +117,7 @@ def _shares(cells, key, words):
 def _seems(result, cells):
     own, plain, (name, other) = (result.judged[FRACTIONAL], result.judged[CLASSICAL],
                                  rival(result))
-    fit = result.fitted[FRACTIONAL].fit
-    order, std = fit["damping_order"], fit.std[fit.names.index("damping_order")]
+    order, std = result.fitted[FRACTIONAL].order
     lagging = [cell for cell in cells if cell.case.lagging]
     seeming = sum(cell.verdict == SEEMS for cell in lagging)
     if own.rms < plain.rms and other.rms < own.rms:

@@ -160,6 +160,12 @@ class Fitted:
         """Number of parameters, the offset not counted."""
         return len(self.fit.names) - 1
 
+    @property
+    def order(self):
+        """Damping order that was found, and its standard uncertainty."""
+        place = self.fit.names.index("damping_order")
+        return self.fit["damping_order"], float(self.fit.std[place])
+
     def sensor_model(self):
         """SensorModel with the delay, without the offset."""
         if hasattr(self.structure, "model"):

@@ -130,7 +130,7 @@ def workers():
         pool.shutdown(cancel_futures=True)
 
 
-def make_map(pool, progress=lambda: None, groups=None):
+def make_map(pool, progress):
     """Fit and judge all candidates on the records of all cells.
 
     Parameters
@@ -138,15 +138,13 @@ def make_map(pool, progress=lambda: None, groups=None):
     pool : concurrent.futures.Executor
     progress : callable
         Called after each cell.
-    groups : list of list of Case, optional
-        Default: `cases`.
 
     Returns
     -------
     list of Cell
     """
     result = []
-    for cell in pool.map(cell_of, cases() if groups is None else groups):
+    for cell in pool.map(cell_of, cases()):
         result.append(cell)
         progress()
     return result

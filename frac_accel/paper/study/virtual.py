@@ -138,8 +138,7 @@ def outcome(case, record=None):
             errors[name] = rms(found.response(frequency) / truth.frequency_response(frequency) - 1)
         residual[name] = float(found.fit.rmse / sensor.std())
         if name == FRACTIONAL:
-            order = found.fit["damping_order"]
-            order_std = float(found.fit.std[found.fit.names.index("damping_order")])
+            order, order_std = found.order
             floor = float(np.sqrt(np.trace(found.relative_covariance(INSIDE_HZ)) / len(INSIDE_HZ)))
     return Outcome(case, inside, beyond, residual, floor, order, order_std)
 
