@@ -60,7 +60,7 @@ setup(
     maintainer_email=about.find("maintainer").get("email"),
     project_urls=urls,
     packages=find_packages(include=[PACKAGE, f"{PACKAGE}.*"]),
-    package_data={PACKAGE: ["**/*.msg", "**/*.yaml", "**/*.html", "py.typed"]},
+    package_data={PACKAGE: ["**/*.html", "py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),

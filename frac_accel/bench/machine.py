@@ -1,15 +1,10 @@
 """What a process uses of the machine, and what others use at the same time."""
 
+import contextlib
 import os
 from pathlib import Path
 
-_TICKS = os.sysconf("SC_CLK_TCK")
-
-
-def cpu_time_s(pid):
-    """Processor time [s] that a process has used so far, that of the kernel for it included."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / _TICKS
+from ..monitoring.errand import TICKS, cpu_time_s
 
 
 def memory_mb(pid):
@@ -20,12 +15,10 @@ def memory_mb(pid):
 
 def most_memory_mb(pid):
     """Largest resident memory [MB] that a process has had; None once it has ended."""
-    try:
+    with contextlib.suppress(OSError):
         for line in Path(f"/proc/{pid}/status").read_text().splitlines():
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024e-6
-    except OSError:
-        pass
     return None
 
 
@@ -43,10 +36,8 @@ class Load:
 
     def update(self):
         """Look again; where a process has ended, the last look counts."""
-        try:
+        with contextlib.suppress(OSError):
             self._last = self._now()
-        except OSError:
-            pass
 
     @property
     def elsewhere(self):
@@ -62,4 +53,4 @@ def _machine_s():
     """Busy and whole processor time [s] of all cores since the machine was started."""
     fields = [int(field) for field in Path("/proc/stat").read_text().split("\n")[0].split()[1:9]]
     idle = fields[3] + fields[4]
-    return (sum(fields) - idle) / _TICKS, sum(fields) / _TICKS
+    return (sum(fields) - idle) / TICKS, sum(fields) / TICKS

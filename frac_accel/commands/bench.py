@@ -4,6 +4,7 @@ Figures are only as good as the machine is quiet: what else it was busy with sta
 table. Peers that are not installed are left out; pip install 'frac_accel[bench]' brings them.
 """
 
+import contextlib
 import importlib
 import importlib.util
 import os
@@ -79,8 +80,6 @@ def _versions():
     from importlib.metadata import PackageNotFoundError, version
     result = {}
     for name in ("frac_accel", "numpy", "scipy", "mcap", "PyDynamic", "rclpy"):
-        try:
+        with contextlib.suppress(PackageNotFoundError):
             result[name] = version(name)
-        except PackageNotFoundError:
-            pass
     return result

@@ -6,6 +6,7 @@ glance. A bag is done once, by its content: the same command goes on where it wa
 that fails is a row with its error, and exit status 4.
 """
 
+import contextlib
 import contextvars
 import os
 
@@ -152,13 +153,14 @@ def _axes(arguments):
 
 
 def _workers(arguments):
+    """Who does the work, as long as it is entered."""
     if arguments.scheduler and arguments.map:
         raise FracAccelError("--scheduler and --map are both given, expected one")
     if arguments.scheduler:
         return Cluster(arguments.scheduler)
     if arguments.map:
-        return Named(arguments.map)
-    return LocalCores(arguments.workers, arguments.memory)
+        return contextlib.nullcontext(Named(arguments.map))
+    return contextlib.nullcontext(LocalCores(arguments.workers, arguments.memory))
 
 
 def _options(arguments):

@@ -42,13 +42,7 @@ class LocalCores:
     """
 
     def __init__(self, count, memory_mb):
-        self.count, self._memory_mb = count, memory_mb
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
+        self._count, self._memory_mb = count, memory_mb
 
     def run(self, function, tasks):
         """(task, result) of each task.
@@ -63,11 +57,11 @@ class LocalCores:
                 yield from self._one_by_one(function, alone)
 
     def _together(self, function, waiting, alone):
-        pool, running = self._pool(self.count), {}
+        pool, running = self._pool(self._count), {}
         others = set(multiprocessing.active_children())
         try:
             while waiting or running:
-                while waiting and len(running) < _AHEAD * self.count:
+                while waiting and len(running) < _AHEAD * self._count:
                     task = waiting[0]
                     running[pool.submit(function, task)] = task
                     waiting.popleft()
@@ -165,17 +159,12 @@ class Cluster:
     def __exit__(self, *_):
         self._client.close(timeout=1)
 
-    @property
-    def count(self):
-        """Number of workers' threads."""
-        return sum(self._client.nthreads().values())
-
     def run(self, function, tasks):
         """(task, result) of each task; what a lost scheduler forgets is handed in again."""
         waiting, running = collections.deque(tasks), {}
         while waiting or running:
             try:
-                most = _AHEAD * max(self.count, 1)
+                most = _AHEAD * max(sum(self._client.nthreads().values()), 1)
                 while waiting and len(running) < most:
                     future = self._client.submit(function, waiting[0], pure=False, retries=_DEATHS)
                     running[future] = waiting.popleft()
@@ -248,8 +237,6 @@ class Named:
         as its results are, and gives the results in any order.
     """
 
-    count = 1
-
     def __init__(self, name):
         module, _, function = name.partition(":")
         try:
@@ -257,12 +244,6 @@ class Named:
         except (ImportError, AttributeError, ValueError) as error:
             raise FracAccelError(f"--map: {name!r} cannot be imported: {error}, expected "
                                  "module:function") from None
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
 
     def run(self, function, tasks):
         """(task, result) of each task, which carries the bag by which it is known again."""

@@ -123,25 +123,16 @@ def read_samples_at(
         raise BagError(f"type {type_name} carries no acceleration: {', '.join(ACCELERATION_TYPES)}")
     if len(offsets) == 0:
         return _no_samples()
-    records, frame_id = _records(type_name, buffer, offsets, lengths)
-    if records is None:
-        return Samples.concatenate(
-            [
-                read_samples_at(type_name, buffer, offsets[i : i + 1], lengths[i : i + 1])
-                for i in range(len(offsets))
-            ]
-        )
-    return _samples_of(records, frame_id)
+    parts, frame_id = _records(type_name, buffer, offsets, lengths)
+    return Samples.concatenate([_samples_of(records, frame_id) for records in parts])
 
 
 def read_covariances(messages: Sequence[bytes]) -> np.ndarray:
     """Whole ``linear_acceleration_covariance`` (n, 9) of serialised Imu messages."""
     if not messages:
         return np.empty((0, 9))
-    records, _ = _records(IMU, *_joined(messages))
-    if records is None:
-        return np.concatenate([read_covariances([message]) for message in messages])
-    return records["covariance"].astype(np.float64)
+    parts, _ = _records(IMU, *_joined(messages))
+    return np.concatenate([records["covariance"].astype(np.float64) for records in parts])
 
 
 def _samples_of(records: np.ndarray, frame_id: str) -> Samples:
@@ -170,19 +161,13 @@ def read_temperatures_at(buffer: bytes, offsets: np.ndarray, lengths: np.ndarray
     """Temperatures of messages that lie in ``buffer`` at ``offsets``; `BagError` if malformed."""
     if len(offsets) == 0:
         return Temperatures(np.empty(0, np.int64), np.empty(0), np.empty(0), "")
-    records, frame_id = _records(TEMPERATURE, buffer, offsets, lengths)
-    if records is None:
-        parts = [
-            read_temperatures_at(buffer, offsets[i : i + 1], lengths[i : i + 1])
-            for i in range(len(offsets))
-        ]
-        return Temperatures(
-            *(np.concatenate(column) for column in list(zip(*parts))[:3]), parts[0].frame_id
-        )
-    variance = records["variance"][:, 0].astype(np.float64)
+    parts, frame_id = _records(TEMPERATURE, buffer, offsets, lengths)
+    celsius, variance = (
+        np.concatenate([records[name][:, 0].astype(np.float64) for records in parts])
+        for name in ("temperature", "variance")
+    )
     variance[variance == 0.0] = np.nan
-    celsius = records["temperature"][:, 0].astype(np.float64)
-    return Temperatures(_stamps(records), celsius, variance, frame_id)
+    return Temperatures(np.concatenate(list(map(_stamps, parts))), celsius, variance, frame_id)
 
 
 def encode_samples(type_name: str, samples: Samples) -> list[bytes]:
@@ -541,11 +526,22 @@ def _known_layout(type_name: str, encapsulation: bytes, frame: bytes, size: int)
 
 def _records(
     type_name: str, buffer: bytes, offsets: np.ndarray, lengths: np.ndarray
-) -> tuple[np.ndarray | None, str]:
-    """Messages as a structured array, or None where they do not all have the first one's layout.
+) -> tuple[list[np.ndarray], str]:
+    """Messages as a structured array, or as one each where their layouts differ; first frame_id.
 
     Messages that follow each other at a constant distance are a view of the buffer.
     """
+    records, frame_id = _like_first(type_name, buffer, offsets, lengths)
+    if records is not None:
+        return [records], frame_id
+    ones = (slice(i, i + 1) for i in range(len(offsets)))
+    return [_like_first(type_name, buffer, offsets[one], lengths[one])[0] for one in ones], frame_id
+
+
+def _like_first(
+    type_name: str, buffer: bytes, offsets: np.ndarray, lengths: np.ndarray
+) -> tuple[np.ndarray | None, str]:
+    """Messages as a structured array, if all have the first one's layout; and its frame_id."""
     start, size = int(offsets[0]), int(lengths[0])
     first = bytes(buffer[start : start + size])
     header, _ = _checked_layout(type_name, first)

@@ -20,6 +20,7 @@ import bisect
 
 import numpy as np
 
+from ..signals.normal_equations import solve
 from .blocks import BLOCK_S, DIRECTIONS
 
 # Mean time between false alarms [h].
@@ -106,10 +107,7 @@ class Learnt:
     """
 
     def __init__(self, merged):
-        gram, shared = merged.gram.sum(axis=0), merged.shared.sum(axis=0)
-        size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        self.mean = np.linalg.lstsq(gram / np.outer(size, size), shared / size,
-                                    rcond=1e-9)[0] / size
+        self.mean = solve(merged.gram.sum(axis=0), merged.shared.sum(axis=0), rcond=1e-9)
         self.variance = float(np.sum(self.left(merged)) / np.sum(merged.count))
         self.inflation = np.maximum(np.mean(self._standard(merged)**2, axis=0), 1e-12)
 

@@ -1,17 +1,20 @@
 """A diagnosis in a process of its own: at the lowest priority, with a budget of processor time."""
 
+import contextlib
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC, write_bag
 
 # Processor time [s] that may be used before the budget's share has come.
 _HEAD_START_S = 1.0
-_TICKS = os.sysconf("SC_CLK_TCK")
+# Units of processor time in a second, as the kernel counts it.
+TICKS = os.sysconf("SC_CLK_TCK")
 
 
 # What the new process does first: it steps back, and ends with its parent (prctl 1), be it stopped
@@ -80,7 +83,8 @@ class Errand:
         """
         status = self._process.poll()
         if status is None:
-            self.cpu_s = _cpu_time_s(self._process.pid, self.cpu_s)
+            with contextlib.suppress(OSError):
+                self.cpu_s = cpu_time_s(self._process.pid)
             allowed = _HEAD_START_S + self._budget * (time.monotonic() - self._begin_s)
             if (self.cpu_s > allowed) != self._is_stopped:
                 self._is_stopped = not self._is_stopped
@@ -99,10 +103,7 @@ class Errand:
             self._process.wait()
 
 
-def _cpu_time_s(pid, otherwise):
-    try:
-        with open(f"/proc/{pid}/stat", encoding="ascii") as file:
-            fields = file.read().rsplit(")", 1)[1].split()
-        return (int(fields[11]) + int(fields[12])) / _TICKS
-    except OSError:
-        return otherwise
+def cpu_time_s(pid):
+    """Processor time [s] that a process has used so far, that of the kernel for it included."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / TICKS
