@@ -18,7 +18,7 @@ from ..io.bag import RAW_TOPIC, BagWriter
 from ..io.samples import Samples
 from . import machine
 from .figures import Figure
-from .live import _ROOT, model_document
+from .passage import ROOT, model_document
 
 _RATE_HZ = 10_000.0
 _MESSAGES = 1_000_000
@@ -62,7 +62,7 @@ def write_bag_of(path, count):
 
 def _correct(folder):
     """Time, processor time [s] and largest memory [MB] of the command."""
-    path = os.pathsep.join(filter(None, [str(_ROOT), os.environ.get("PYTHONPATH")]))
+    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
     start = time.perf_counter()
     process = subprocess.Popen(
         [sys.executable, "-m", "frac_accel.cli", "correct", "raw.mcap", "--model", "model.yaml",

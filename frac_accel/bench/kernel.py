@@ -9,7 +9,7 @@ from ..model import SensorModel
 from ..streaming import Corrector
 from ..streaming.live_messages import SampleMessages
 from .figures import Figure
-from .live import model_document
+from .passage import model_document
 from .uncertainty import shortest_us
 
 _RATE_HZ = 10_000.0

@@ -1,6 +1,6 @@
 """Many sensors in one corrector, beside a relay of all their topics; and a vehicle's rates.
 
-Ratios are taken within a round; see `live` for how each passage is measured.
+Ratios are taken within a round; see `passage` for how each passage is measured.
 """
 
 import contextlib
@@ -16,17 +16,16 @@ import yaml
 from ..errors import FracAccelError
 from . import machine
 from .figures import Figure
-from .live import (
-    PEERS,
-    _await,
-    _environment,
-    _passage,
-    _process,
-    _tell,
-    _until_quiet,
+from .live import PEERS
+from .passage import (
+    await_ready,
     corrector_command,
     pass_through,
+    passage_of,
+    process_of,
     relay_command,
+    tell,
+    until_quiet,
     write_model,
 )
 
@@ -60,16 +59,15 @@ def pass_through_many(command, count, rate_hz, design=None):
     """
     samples = int((_WARM_UP_S + _SECONDS) * rate_hz)
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
-        environment = _environment()
-        node = stack.enter_context(_process(command, environment, subprocess.DEVNULL))
+        node = stack.enter_context(process_of(command, subprocess.DEVNULL))
         files = {role: str(Path(folder) / f"{role}.npy") for role in ("receive", "publish")}
-        sink, source = (stack.enter_context(_process(
+        sink, source = (stack.enter_context(process_of(
             [sys.executable, "-m", "frac_accel.nodes._bench_sensors", role, file, "--sensors",
              str(count), "--rate", str(rate_hz), "--count", str(samples)],
-            environment, subprocess.PIPE)) for role, file in files.items())
+            subprocess.PIPE)) for role, file in files.items())
         for process in (sink, source):
-            _await(process, command)
-            _tell(process)
+            await_ready(process, command)
+            tell(process)
         time.sleep(_WARM_UP_S)
         cpu_s, start_s = machine.cpu_time_s(node.pid), time.monotonic()
         load = machine.Load([node.pid, sink.pid, source.pid])
@@ -78,12 +76,12 @@ def pass_through_many(command, count, rate_hz, design=None):
         load.update()
         memory_mb = machine.most_memory_mb(node.pid)
         source.wait(120)
-        _until_quiet(node.pid)
-        _tell(sink)
+        until_quiet(node.pid)
+        tell(sink)
         sink.wait(60)
         sent, (sensors, stamps, arrivals) = np.load(files["publish"]), np.load(files["receive"])
-    passages = [_passage(sent[i], stamps[sensors == i], arrivals[sensors == i], rate_hz, 1, design,
-                         0.0, 0.0) for i in range(count)]
+    passages = [passage_of(sent[i], stamps[sensors == i], arrivals[sensors == i], rate_hz, 1,
+                           design, 0.0, 0.0) for i in range(count)]
     latencies = np.concatenate([one.latencies_ms for one in passages])
     return {"lost": sum(one.lost for one in passages), "cores": cores, "memory_mb": memory_mb,
             "p50_ms": float(np.median(latencies)), "p99_ms": float(np.percentile(latencies, 99)),
@@ -105,7 +103,7 @@ def many_command(folder, model_file, count, rate_hz, budget_ms):
 
 def idle_cores(command):
     """Share of a core that a node takes without any message."""
-    with _process(command, _environment(), subprocess.DEVNULL) as node:
+    with process_of(command, subprocess.DEVNULL) as node:
         time.sleep(4.0)
         cpu_s, start_s = machine.cpu_time_s(node.pid), time.monotonic()
         time.sleep(_IDLE_S)

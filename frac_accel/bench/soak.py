@@ -12,7 +12,7 @@ import time
 import numpy as np
 
 from ..shown import above
-from . import live, machine
+from . import machine, passage
 
 # The first part of the run fills windows and queues, and is no growth.
 _SETTLED = 0.25
@@ -39,8 +39,8 @@ def main(arguments=None):
     chosen = parser.parse_args(arguments)
     memory_mb = []
     with tempfile.TemporaryDirectory() as folder:
-        model_file, design = live.write_model(folder, chosen.rate)
-        command = live.corrector_command(model_file, chosen.rate)
+        model_file, design = passage.write_model(folder, chosen.rate)
+        command = passage.corrector_command(model_file, chosen.rate)
         run = _with_restarts if chosen.restart else _in_one_go
         found, latencies_ms = run(command, chosen, design, memory_mb.append)
     settled = np.array(memory_mb[int(_SETTLED * len(memory_mb)):])
@@ -62,9 +62,9 @@ def main(arguments=None):
 
 
 def _in_one_go(command, chosen, design, watch):
-    passage = live.pass_through(command, chosen.rate, 60 * chosen.minutes, design, watch=watch)
-    return {"sent": passage.sent, "lost": passage.lost, "cpu_us_per_message": passage.cpu_us,
-            "cores_busy_elsewhere": passage.busy_elsewhere}, passage.latencies_ms
+    found = passage.pass_through(command, chosen.rate, 60 * chosen.minutes, design, watch=watch)
+    return {"sent": found.sent, "lost": found.lost, "cpu_us_per_message": found.cpu_us,
+            "cores_busy_elsewhere": found.busy_elsewhere}, found.latencies_ms
 
 
 def _with_restarts(command, chosen, design, watch):
@@ -76,7 +76,7 @@ def _with_restarts(command, chosen, design, watch):
     random = np.random.default_rng(0)
     count, first, sent_at = int(_SENDING * chosen.restart * chosen.rate), 0, []
     begun = [-np.inf]
-    with live.node_and_sink(command, chosen.rate) as (node, start_publisher, stop_sink):
+    with passage.node_and_sink(command, chosen.rate) as (node, start_publisher, stop_sink):
         cpu_s = machine.cpu_time_s(node.pid)
         end = time.monotonic() + 60 * chosen.minutes
         while time.monotonic() < end:
@@ -91,7 +91,7 @@ def _with_restarts(command, chosen, design, watch):
         cpu_s = machine.cpu_time_s(node.pid) - cpu_s
         stamps, arrivals, counters = stop_sink()
     numbers, instants = np.concatenate(sent_at, axis=1)
-    index = np.round((stamps + design.sensor_delay_ns - live.START_NS) * 1e-9 * chosen.rate)
+    index = np.round((stamps + design.sensor_delay_ns - passage.START_NS) * 1e-9 * chosen.rate)
     at = np.searchsorted(numbers, index.astype(np.int64) + design.delay_samples)
     # those after which a publisher ended were given out when the next one came
     known = at < len(numbers)

@@ -9,7 +9,7 @@ from ..model import SensorModel
 from ..streaming import Corrector
 from ..uncertainty import UncertainFilter
 from .figures import Figure
-from .live import model_document
+from .passage import model_document
 
 _SAMPLES = 100_000
 _PEER_SAMPLES = 2000

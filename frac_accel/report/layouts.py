@@ -47,13 +47,9 @@ class Topics:
 
 
 def foxglove(topics):
-    """Layout for Foxglove as text.
+    """Layout for Foxglove of some `Topics`, as text.
 
     The band is made by a script of the layout, so that nothing is published for it.
-
-    Parameters
-    ----------
-    topics : Topics
     """
     signals, band = topics.of_signals, "/studio_script/corrected_2u"
     panels = {}
@@ -126,13 +122,9 @@ def _script(corrected, band):
 
 
 def plotjuggler(topics):
-    """Layout for PlotJuggler as text.
+    """Layout for PlotJuggler of some `Topics`, as text.
 
     The band is two series that it computes itself, from the corrected samples' covariance.
-
-    Parameters
-    ----------
-    topics : Topics
     """
     signals = topics.of_signals
     root = xml.Element("root")

@@ -13,13 +13,7 @@ from .signals import sentence
 
 
 def study_sections(page, study):
-    """Add the sections.
-
-    Parameters
-    ----------
-    page : Page
-    study : Study
-    """
+    """Add the sections on a `Study` to a page."""
     _bench(page.section("The experiment done properly: bench and method"), study)
     _held_out(page.section("Held-out errors on the bench"), study)
     _swept(page.section("Orders swept and optimised"), study)

@@ -57,10 +57,10 @@ def test_verdicts():
 @pytest.mark.ros
 def test_messages_are_counted_and_timed_over_dds(tmp_path):
     pytest.importorskip("rclpy")
-    from frac_accel.bench import live
-    model_file, design = live.write_model(tmp_path, 1000.0)
+    from frac_accel.bench import passage as bench
+    model_file, design = bench.write_model(tmp_path, 1000.0)
     memory = []
-    passage = live.pass_through(live.corrector_command(model_file, 1000.0), 1000.0, 1.5, design,
+    passage = bench.pass_through(bench.corrector_command(model_file, 1000.0), 1000.0, 1.5, design,
                                 watch=memory.append)
     assert passage.lost == 0
     assert passage.sent == len(passage.latencies_ms) == 1500 - design.delay_samples
