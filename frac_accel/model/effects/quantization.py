@@ -10,6 +10,8 @@ from .base import QUANTIZATION, Effect, Reading
 # Share of an error's power that rounding must have where the values have been put on other
 # instants, and largest share that is ascribed to it.
 _LEAST, _MOST = 0.2, 0.99
+# Stretches of a record from each of which rounding takes the same power.
+_STRETCHES = 40
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,7 +53,7 @@ class Quantization(Effect):
         after = (values - self.simulate(output, None))[used]
         share = min(self.step**2 / 12 / np.mean(before**2), _MOST)
         if np.mean(after**2) > (1 - share) * np.mean(before**2):
-            after = before * np.sqrt(1 - share)
+            after = _without(before, share)
         return Reading({"step": 1e-6 * self.step}, before, after,
                        next(words for words in seen.found.words if "multiples" in words),
                        evident="sensor" in seen.record.resampled)
@@ -62,3 +64,15 @@ class Quantization(Effect):
     def invert(self, values, variance, circumstances):
         """The values as they are, with the variance of a uniform error of one step's width."""
         return values, variance + self.step**2 / 12
+
+
+def _without(error, share):
+    """An error without a share of its power, the same power in each stretch: where there is more
+    error, rounding is less of it, which is what makes the share uncertain."""
+    parts = np.array_split(error, _STRETCHES)
+    power = np.repeat([np.mean(part**2) if len(part) else 1.0 for part in parts],
+                      [len(part) for part in parts])
+    rest = 1 - np.minimum(share * np.mean(error**2) / np.maximum(power, 1e-300), _MOST)
+    left = error * np.sqrt(rest)
+    # stretches with less error than that have given less
+    return left * np.sqrt((1 - share) * np.mean(error**2) / max(np.mean(left**2), 1e-300))
