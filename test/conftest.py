@@ -6,7 +6,8 @@ import pytest
 FAST = """
     bag_hostile bag_roundtrip cdr commands core_response diagnosis_thresholds effect_checks
     effects_invert health linear_filter live_messages live_metrics metrics model_file public_api
-    report_figures report_page rooms short_columns thresholds timing z_and_s
+    report_figures report_page rooms short_columns short_excitation thresholds timing
+    validate_before_record z_and_s
 """.split()
 SLOW = """
     test_memory_does_not_grow_with_the_bag test_only_the_asked_for_verb_is_loaded

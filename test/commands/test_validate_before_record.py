@@ -14,7 +14,6 @@ from frac_accel.validation import whole_nrmse
 RATE = 100.0
 
 
-@pytest.mark.fast
 @pytest.mark.parametrize("seed", range(3))
 def test_a_slow_high_pass_may_have_begun_in_mid_motion(seed):
     rng = np.random.default_rng(seed)
@@ -32,7 +31,6 @@ def test_a_slow_high_pass_may_have_begun_in_mid_motion(seed):
     assert whole_nrmse(pair, other) > 1.5e-2
 
 
-@pytest.mark.fast
 def test_noise_that_the_slower_topic_cannot_show_is_no_error():
     rng = np.random.default_rng(5)
     reference, sensor = record(rng, lambda s: 0.8 + 0 * s, band=(0.2, 5.0), n=12_000, rate=RATE,

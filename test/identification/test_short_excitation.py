@@ -12,7 +12,6 @@ from frac_accel.identification.response.excitation import (
 RATE = 500.0
 
 
-@pytest.mark.fast
 @pytest.mark.parametrize("seed", range(6))
 def test_a_short_sweep_excites_more_than_one_frequency(seed):
     rng = np.random.default_rng(seed)
@@ -22,7 +21,6 @@ def test_a_short_sweep_excites_more_than_one_frequency(seed):
     require_excitation(sweep + 1e-3 * rng.standard_normal(len(time)), RATE, 4)
 
 
-@pytest.mark.fast
 @pytest.mark.parametrize("seed", range(6))
 def test_one_sine_stays_one(seed):
     rng = np.random.default_rng(seed)
