@@ -20,6 +20,9 @@ A verdict is withdrawn `CLEAR_FRAMES` after the last frame that made it, when th
 good samples again.
 """
 
+import math
+from typing import NamedTuple
+
 import numpy as np
 
 # Length of a frame [s] and its fewest samples; times [s] at rest until an axis is stuck; smallest
@@ -61,20 +64,11 @@ class AxisMonitors:
     def __init__(self, sampling_rate_hz, limits, noise_std, largest_rate=0.0):
         self._length = max(FEWEST, int(round(FRAME_S * sampling_rate_hz)))
         self._frame_s = self._length / sampling_rate_hz
-        self._limits, self._noise_std = limits, noise_std
+        self.set_limits(limits, noise_std)
         self._largest_step = largest_rate / sampling_rate_hz or np.inf
         self._part, self._count = [], 0
         self._last = None
-        self._only_zero = np.ones(3, bool)
-        self._lattice = np.full(3, np.inf)
-        # coarse until it has shown that it is not, in frames in which it was not still
-        self._repeats, self._frames = np.ones(3), np.zeros(3)
-        # repetitions in these frames, all together and the most in one
-        self._repeated, self._most_repeated = np.zeros(3), np.zeros(3)
-        self._still_s, self._moved_s, self._fine_s = np.zeros(3), np.zeros(3), np.zeros(3)
-        self._still_at = np.full(3, np.nan)
-        self._at_limit, self._held = np.zeros(3, int), np.zeros(3, int)
-        self._code, self._since = np.zeros(3, int), np.full(3, CLEAR_FRAMES)
+        self._axes = [_Axis(self._frame_s) for _ in range(3)]
         # from which sample on each axis has had which fault
         self.changes = [(-1, (0, 0, 0))]
 
@@ -84,7 +78,8 @@ class AxisMonitors:
 
     def set_limits(self, limits, noise_std):
         """Go on with what another model says."""
-        self._limits, self._noise_std = limits, noise_std
+        self._limits = list(zip(*(limit.tolist() for limit in limits)))
+        self._noise_std = noise_std.tolist()
 
     def add(self, index, values):
         """Look at the next samples: their running numbers and values, shape (n,) and (n, 3)."""
@@ -112,70 +107,137 @@ class AxisMonitors:
 
     def _judge(self, frame, end):
         """Verdict on a whole frame, which ends with the sample of this running number."""
-        frame = frame[np.isfinite(frame).all(axis=1)]
-        if len(frame) < 2:
-            return
-        before = frame[:1] if self._last is None else self._last[None]
         # axis by axis in memory, as numpy is ten times slower along the other way
-        frame = np.ascontiguousarray(np.concatenate([before, frame]).T)
-        steps = np.abs(np.diff(frame, axis=1))
-        frame = frame[:, 1:]
+        frame = np.ascontiguousarray(frame.T)
+        lowest, highest = frame.min(axis=1).tolist(), frame.max(axis=1).tolist()
+        if not all(map(math.isfinite, (*lowest, *highest))):
+            frame = frame[:, np.isfinite(frame).all(axis=0)]
+            if frame.shape[1] < 2:
+                return
+            lowest, highest = frame.min(axis=1).tolist(), frame.max(axis=1).tolist()
+        steps = np.empty_like(frame)
+        np.subtract(frame[:, 1:], frame[:, :-1], out=steps[:, 1:])
+        steps[:, 0] = 0.0 if self._last is None else frame[:, 0] - self._last
+        np.abs(steps, out=steps)
         self._last = frame[:, -1]
-        moved = np.where(steps > 0, steps, np.inf).min(axis=1)
-        self._lattice = np.minimum(self._lattice, moved)
-        span = np.ptp(frame, axis=1)
-        repeated = np.mean(steps == 0, axis=1)
-        found = np.zeros(3, int)
-        self._find_still(frame, span, repeated, found)
-        self._only_zero &= (frame == 0).all(axis=1)
-        found[(found == 1) & self._only_zero] = FAULTS.index(NOT_CONNECTED)
-        low, high = (limit[:, None] for limit in self._limits)
-        at_limit = np.mean((frame <= low) | (frame >= high), axis=1) > 0.5
-        self._at_limit = np.where(at_limit, self._at_limit + 1, 0)
-        found[self._at_limit >= 2] = 3
-        with np.errstate(invalid="ignore"):
-            jumps = np.divide(steps.sum(axis=1), np.sum(steps > 0, axis=1),
-                              out=np.zeros(3), where=(steps > 0).any(axis=1))
-            held = ((repeated > REPEATED) & (jumps > JUMPS * self._lattice)
-                    & (span > MOVES * self._lattice))
-        self._held = np.where(held, self._held + 1, 0)
-        found[(self._held >= HELD_FRAMES) & (found == 0)] = 4
-        found[(steps > self._largest_step).any(axis=1) & (found == 0)] = 5
-        self._since = np.where(found > 0, 0, self._since + 1)
-        self._code = np.where(found > 0, found,
-                              np.where(self._since >= CLEAR_FRAMES, 0, self._code))
-        code = tuple(int(each) for each in self._code)
+        seen = [_seen(*each) for each in zip(frame, steps, lowest, highest)]
+        # numbers of single axes from here on: arrays of three cost more than what is done to them
+        moving = [axis.moves(own) for axis, own in zip(self._axes, seen)]
+        fine = [moves and own.repeated <= _USED_TO for moves, own in zip(moving, seen)]
+        for i, (axis, own) in enumerate(zip(self._axes, seen)):
+            tolerance = max(_NOISE_SHARE * self._noise_std[i],
+                            _OTHER_SHARE * max(seen[i - 1].span, seen[i - 2].span))
+            stuck = axis.is_stuck(own, tolerance, moving[i - 1] or moving[i - 2],
+                                  fine[i - 1] or fine[i - 2])
+            axis.decide(own, stuck, tolerance, self._limits[i], self._largest_step)
+        code = tuple(axis.code for axis in self._axes)
         if code != self.changes[-1][1]:
             self.changes.append((end, code))
 
-    def _find_still(self, frame, span, repeated, found):
-        others = np.array([max(span[i - 1], span[i - 2]) for i in range(3)])
-        tolerance = np.maximum(_NOISE_SHARE * self._noise_std, _OTHER_SHARE * others)
-        same = np.abs(frame[:, 0] - self._still_at) <= tolerance
-        still = (span <= tolerance) & (same | np.isnan(self._still_at))
-        self._still_at = np.where(span <= tolerance, np.where(still, self._still_at, np.nan),
-                                  np.nan)
-        self._still_at = np.where(np.isnan(self._still_at) & (span <= tolerance), frame[:, 0],
-                                  self._still_at)
-        self._still_s = np.where(still, self._still_s + self._frame_s, 0.0)
-        moving = span >= MOVES * self._lattice
-        fine = moving & (repeated <= _USED_TO)
-        others_move, others_fine = (np.array([axes[i - 1] or axes[i - 2] for i in range(3)])
-                                    for axes in (moving, fine))
-        self._moved_s = np.where(still, self._moved_s + self._frame_s * others_move, 0.0)
-        self._fine_s = np.where(still, self._fine_s + self._frame_s * others_fine, 0.0)
-        used_to = self._repeats > _USED_TO
+
+class _Seen(NamedTuple):
+    """A frame of one axis: samples, steps and what is told by them."""
+
+    values: np.ndarray
+    steps: np.ndarray
+    lowest: float
+    highest: float
+    span: float
+    repeated: float
+    smallest_step: float
+
+
+def _seen(values, steps, lowest, highest):
+    smallest, repeated = float(steps.min()), 0.0
+    if not smallest:
+        repeated = (len(steps) - np.count_nonzero(steps)) / len(steps)
+        smallest = float(np.where(steps > 0, steps, np.inf).min())
+    return _Seen(values, steps, lowest, highest, highest - lowest, repeated, smallest)
+
+
+class _Axis:
+    """What one axis has shown so far.
+
+    Attributes
+    ----------
+    code : int
+        Place of its fault in `FAULTS`.
+    """
+
+    def __init__(self, frame_s):
+        self._frame_s = frame_s
+        self._only_zero = True
+        self._lattice = math.inf
+        # coarse until it has shown that it is not, in frames in which it was not still
+        self._repeats, self._frames = 1.0, 0
+        # repetitions in these frames, all together and the most in one
+        self._repeated = self._most_repeated = 0.0
+        self._still_s = self._moved_s = self._fine_s = 0.0
+        self._still_at = None
+        self._at_limit = self._held = 0
+        self.code, self._since = 0, CLEAR_FRAMES
+
+    def moves(self, own):
+        """Whether it moves by some of its own smallest steps, this frame's included."""
+        self._lattice = min(self._lattice, own.smallest_step)
+        return own.span >= MOVES * self._lattice
+
+    def is_stuck(self, own, tolerance, others_move, others_fine):
+        """Whether it has been at rest for too long, beside others that move, perhaps finely."""
+        first, rests = float(own.values[0]), own.span <= tolerance
+        if not rests or (self._still_at is not None and abs(first - self._still_at) > tolerance):
+            # it moves, or is at rest elsewhere
+            self._still_at = first if rests else None
+            self._still_s = self._moved_s = self._fine_s = 0.0
+            self._learn(own.repeated)
+            return False
+        if self._still_at is None:
+            self._still_at = first
+        self._still_s += self._frame_s
+        self._moved_s += self._frame_s * others_move
+        self._fine_s += self._frame_s * others_fine
         # the frame in which an axis dies is half still
         unknown = self._repeated - self._most_repeated <= _USED_TO * self._frames
-        # a still axis says nothing of what it is used to
-        learns = np.maximum(_LEARNS, 1 / (self._frames + _PRIOR))
-        self._repeats = np.where(still, self._repeats,
-                                 self._repeats + learns * (repeated - self._repeats))
-        self._frames += ~still
-        self._repeated += np.where(still, 0.0, repeated)
-        self._most_repeated = np.where(still, self._most_repeated,
-                                       np.maximum(self._most_repeated, repeated))
-        needed = np.where(used_to, COARSE_S, STUCK_S) * (1 - 1e-9)
-        stuck = ((self._moved_s >= needed) | (self._still_s >= LONG_S)
-                 | unknown & (self._fine_s >= UNKNOWN_S * (1 - 1e-9)))
-        found[stuck] = np.where(np.abs(frame[:, -1]) <= tolerance, 1, 2)[stuck]
+        needed_s = COARSE_S if self._repeats > _USED_TO else STUCK_S
+        return (self._moved_s >= needed_s * (1 - 1e-9) or self._still_s >= LONG_S
+                or unknown and self._fine_s >= UNKNOWN_S * (1 - 1e-9))
+
+    def _learn(self, repeated):
+        """Share of repetitions that it is used to; a still axis says nothing of that."""
+        learns = max(_LEARNS, 1 / (self._frames + _PRIOR))
+        self._repeats += learns * (repeated - self._repeats)
+        self._frames += 1
+        self._repeated += repeated
+        self._most_repeated = max(self._most_repeated, repeated)
+
+    def decide(self, own, stuck, tolerance, limits, largest_step):
+        """Find the fault of this frame; one that is no longer there is withdrawn after a while."""
+        self._only_zero = self._only_zero and own.lowest == 0 == own.highest
+        found = ""
+        if stuck:
+            found = "dead" if abs(own.values[-1]) <= tolerance else "stuck"
+            found = NOT_CONNECTED if found == "dead" and self._only_zero else found
+        self._at_limit = self._at_limit + 1 if _is_at(own, *limits) else 0
+        self._held = self._held + 1 if self._is_held(own) else 0
+        if self._at_limit >= 2:
+            found = "saturated"
+        elif self._held >= HELD_FRAMES and not found:
+            found = "held"
+        elif not found and own.steps.max() > largest_step:
+            found = "too fast"
+        self._since = 0 if found else self._since + 1
+        if found or self._since >= CLEAR_FRAMES:
+            self.code = FAULTS.index(found)
+
+    def _is_held(self, own):
+        if own.repeated <= REPEATED or not own.span > MOVES * self._lattice:
+            return False
+        jumps = float(own.steps.sum()) / max(np.count_nonzero(own.steps), 1)
+        return jumps > JUMPS * self._lattice
+
+
+def _is_at(own, low, high):
+    """Whether more than half of a frame's samples are at the limits."""
+    if low < own.lowest and own.highest < high:
+        return False
+    return np.count_nonzero((own.values <= low) | (own.values >= high)) > 0.5 * len(own.values)
