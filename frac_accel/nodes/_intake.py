@@ -18,6 +18,8 @@ from frac_accel.nodes._errors import INVALID_ENDPOINT, NodeError
 
 # So few subscriptions are asked for messages without looking first whether there are any.
 _FEW = 4
+# Services, timers and what else is the executor's are looked at so often [s].
+_LOOK_S = 0.2
 
 
 class RawMessage(NamedTuple):
@@ -233,14 +235,20 @@ class DirectIntake:
 
     def __init__(self, node) -> None:
         self._node = node
-        self._wait_set, self._handles, self._pointers = None, [], []
+        self._messages, self._all = _WaitSet(node), _WaitSet(node)
+        self._look_s, self._has_work = 0.0, False
         self.is_possible = True
 
-    def wait(self, seconds: float) -> None:
-        """Hand over what comes within this time."""
-        end_s = time.monotonic() + seconds
-        while (left_s := end_s - time.monotonic()) > 0 and self.is_possible:
-            ready = self._attempt(self._ready, left_s)
+    def wait(self, seconds: float) -> bool:
+        """Hand over what comes within this time; ends early, and is true, if the executor has work.
+
+        A turn of the executor costs several times what it costs to see that there is nothing for
+        it.
+        """
+        end_s, self._has_work = time.monotonic() + seconds, False
+        while ((left_s := end_s - time.monotonic()) > 0 and self.is_possible
+               and not self._has_work):
+            ready = self._attempt(self._ready, left_s, time.monotonic() >= self._look_s)
             if ready and self._node.latency_budget_s:
                 time.sleep(self._node.latency_budget_s)
                 every = self._node.direct_subscriptions
@@ -248,20 +256,22 @@ class DirectIntake:
                          if len(every) <= _FEW else self._attempt(self._ready, 0.0))
             for subscription in ready or ():
                 subscription.take_batch()
+        return self._has_work
 
-    def _ready(self, seconds: float) -> list[RawSubscription]:
-        subscriptions = self._node.direct_subscriptions
-        handles = [each.subscription.handle for each in subscriptions]
-        if handles != self._handles:
-            self._wait_set = rclpy_implementation.WaitSet(
-                len(handles), 0, 1, 0, 0, 0, self._node.context.handle)
-            self._handles, self._pointers = handles, [handle.pointer for handle in handles]
-        self._wait_set.clear_entities()
-        for handle in handles:
-            self._wait_set.add_subscription(handle)
-        self._wait_set.wait(int(seconds * 1e9))
-        ready = set(self._wait_set.get_ready_entities("subscription"))
-        return [each for each, pointer in zip(subscriptions, self._pointers) if pointer in ready]
+    def _ready(self, seconds: float, looks: bool = False) -> list[RawSubscription]:
+        node, direct = self._node, self._node.direct_subscriptions
+        handles = [each.subscription.handle for each in direct]
+        if not looks:
+            ready = self._messages.wait(seconds, handles)[0]
+            return [each for each, is_ready in zip(direct, ready) if is_ready]
+        others = [each.handle for each in node.subscriptions
+                  if not isinstance(each.callback_group, OutsideExecutor)]
+        ready, *rest = self._all.wait(
+            seconds, handles + others, *([each.handle for each in kind] for kind in (
+                node.timers, node.clients, node.services)))
+        self._has_work = any(ready[len(handles):]) or any(map(any, rest))
+        self._look_s = time.monotonic() + _LOOK_S
+        return [each for each, is_ready in zip(direct, ready) if is_ready]
 
     def _attempt(self, function, *arguments):
         try:
@@ -272,3 +282,31 @@ class DirectIntake:
                 subscription.callback_group.is_active = False
             self._node.get_logger().warning(f"messages are waited for by the executor: {error}")
             return None
+
+
+class _WaitSet:
+    """A wait set that is made anew where it is to wait for something else."""
+
+    _KINDS = ("subscription", "timer", "client", "service")
+
+    def __init__(self, node) -> None:
+        self._node = node
+        self._set, self._handles, self._pointers = None, None, []
+
+    def wait(self, seconds: float, *handles) -> list[list[bool]]:
+        """Which of the handles of subscriptions, timers, clients and services are ready."""
+        if handles != self._handles:
+            counts = [*map(len, handles), 0, 0, 0][:4]
+            self._set = rclpy_implementation.WaitSet(
+                counts[0], 0, *counts[1:], 0, self._node.context.handle)
+            self._handles = handles
+            self._pointers = [[handle.pointer for handle in kind] for kind in handles]
+        self._set.clear_entities()
+        for kind, own in zip(self._KINDS, handles):
+            add = getattr(self._set, f"add_{kind}")
+            for handle in own:
+                add(handle)
+        self._set.wait(int(seconds * 1e9))
+        return [[pointer in ready for pointer in pointers] for pointers, ready in (
+            (pointers, set(self._set.get_ready_entities(kind)))
+            for kind, pointers in zip(self._KINDS, self._pointers))]

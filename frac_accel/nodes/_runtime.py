@@ -30,8 +30,8 @@ from frac_accel.nodes._errors import NodeError, did_you_mean
 from frac_accel.nodes._intake import DirectIntake, RawSubscription
 from frac_accel.nodes._service import ServiceManager
 
-# How often services and all that is not taken directly have their turn.
-_EXECUTOR_PERIOD_S = 0.2
+# How often the executor has a turn for what `DirectIntake` does not look at, such as events of QoS.
+_EXECUTOR_PERIOD_S = 1.0
 _POLL_S = 0.001
 
 
@@ -48,7 +48,7 @@ class FracAccelNode(Node):
     done = False
     is_active = True
     latency_budget_s = 0.0
-    turn_s = 0.1
+    turn_s = 0.2
 
     def __init__(self, name: str, **options) -> None:
         self.direct_subscriptions: list[RawSubscription] = []
@@ -167,8 +167,7 @@ def run_node(make_node: Callable[[], FracAccelNode], arguments: Sequence[str] | 
         while not (stop.requested or node.done):
             # A bounded wait, because a Python signal handler runs only between two of them.
             if direct.is_possible and node.direct_subscriptions:
-                direct.wait(node.turn_s)
-                if time.monotonic() >= next_s:
+                if direct.wait(node.turn_s) or time.monotonic() >= next_s:
                     next_s = time.monotonic() + _EXECUTOR_PERIOD_S
                     executor.spin_once(timeout_sec=0)
             else:

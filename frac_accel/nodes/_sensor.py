@@ -33,8 +33,8 @@ class Sensor:
     ----------
     model_hash : str
         SHA-256 of the model's file; empty without a model.
-    next_report_s : float
-        Monotonic time from which on it is to report.
+    reported_s, next_report_s : float
+        Monotonic time of its last report, and from which on it is to report again.
 
     Raises
     ------
@@ -44,7 +44,8 @@ class Sensor:
 
     def __init__(self, node, name=""):
         self.name, self._node = name, node
-        self.model_hash, self.next_report_s = "", 0.0
+        self.model_hash = ""
+        self.reported_s = self.next_report_s = 0.0
         self.channels, self._reference_s = [], None
         self._reference_subscription = self._temperature_subscription = None
         try:

@@ -254,8 +254,10 @@ class Corrector(FracAccelNode):
     def _spread_reports(self):
         """Let each sensor report once in a period, and not all at once."""
         step_s = _PERIOD_S / max(len(self.sensors), 1)
+        now_s = time.monotonic()
         for i, sensor in enumerate(self.sensors.values()):
-            sensor.next_report_s = time.monotonic() + _PERIOD_S + i * step_s
+            sensor.reported_s = sensor.reported_s or now_s
+            sensor.next_report_s = now_s + _PERIOD_S + i * step_s
         self.turn_s = min(self.turn_s, step_s)
 
     def _take_turn(self):
@@ -271,8 +273,10 @@ class Corrector(FracAccelNode):
         for sensor in list(self.sensors.values()):
             sensor.take_reference()
             if now_s >= sensor.next_report_s:
-                period_s = now_s - sensor.next_report_s + _PERIOD_S
-                sensor.next_report_s = now_s + _PERIOD_S
+                period_s, sensor.reported_s = now_s - sensor.reported_s, now_s
+                # those that a stall has brought together part again
+                missed = (now_s - sensor.next_report_s) // _PERIOD_S
+                sensor.next_report_s += (missed + 1) * _PERIOD_S
                 self._report(sensor, period_s)
 
     def _report(self, sensor, period_s):

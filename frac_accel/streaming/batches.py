@@ -124,6 +124,8 @@ class Batches:
             batches before.
         """
         samples = [index, stamps_ns, values, variance]
+        if not self.size and self._is_simple(stamps_ns, values):
+            return samples, None
         if self.held is not None:
             samples = [np.concatenate(pair) for pair in zip(self.held, samples)]
             self.held = None
@@ -150,26 +152,28 @@ class Batches:
 
     def _looked_through(self, stamps, values):
         """Number of samples before batches begin; all where they do not."""
-        repeats = stamps[1:] == stamps[:-1]
-        quick = not self._repeats and not repeats.any() and (
-            self._last is None or self._last[0] != stamps[0])
-        if not quick:
-            for i, stamp in enumerate(stamps.tolist()):
-                if self._last is None or stamp != self._last[0]:
-                    if self._is_batched(stamp):
-                        self.begin((self._count - self._starts[0][0]) / len(self._starts))
-                        return i
-                    self._starts.append((self._count, stamp))
-                elif (values[i] != self._last[1]).any():
-                    self._repeats.append(self._count)
-                self._last = stamp, values[i]
-                self._count += 1
-            return len(stamps)
+        for i, stamp in enumerate(stamps.tolist()):
+            if self._last is None or stamp != self._last[0]:
+                if self._is_batched(stamp):
+                    self.begin((self._count - self._starts[0][0]) / len(self._starts))
+                    return i
+                self._starts.append((self._count, stamp))
+            elif (values[i] != self._last[1]).any():
+                self._repeats.append(self._count)
+            self._last = stamp, values[i]
+            self._count += 1
+        return len(stamps)
+
+    def _is_simple(self, stamps, values):
+        """Whether no sample repeats a stamp, now or shortly before; they are then noted."""
+        if self._repeats or not len(stamps) or (self._last and self._last[0] == stamps[0]) or (
+                len(stamps) > 1 and (stamps[1:] == stamps[:-1]).any()):
+            return False
         self._count += len(stamps)
         tail = stamps[-WINDOW:].tolist()
         self._starts.extend(zip(range(self._count - len(tail), self._count), tail))
-        self._last = int(stamps[-1]), values[-1]
-        return len(stamps)
+        self._last = tail[-1], values[-1]
+        return True
 
     def _is_batched(self, stamp):
         """Whether a sample with this stamp is the first one of a batch."""

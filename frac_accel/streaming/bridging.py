@@ -29,6 +29,8 @@ from ..signals.parallel_filter import FilterState
 # Samples from which all is found, and those after which it is found anew.
 HISTORY = 4096
 _ANEW = 256
+# Samples that are put together at a time, at least: many small blocks take much memory.
+_TOGETHER = 64
 # Fewest pairs of samples that a lag is known from, and fewest places of a bridge.
 _PAIRS, _PLACES = 16, 30
 # Places within the length of one bridge that are looked at: those closer say the same.
@@ -68,6 +70,7 @@ class BridgeErrors:
     def __init__(self, longest):
         self.longest = longest
         self._blocks, self._length = collections.deque(), 0
+        self._latest, self._latest_length = [], 0
         self._total, self._found_at = 0, None
         self._roots, self._next = {}, 0
         self._near = collections.deque()
@@ -75,9 +78,14 @@ class BridgeErrors:
 
     def add(self, values):
         """Append samples that follow each other, shape (n, 3); NaN where one is missing."""
-        self._blocks.append(values[-HISTORY:])
-        self._length += len(self._blocks[-1])
         self._total += len(values)
+        self._latest.append(values[-HISTORY:])
+        self._latest_length += len(self._latest[-1])
+        if self._latest_length < _TOGETHER:
+            return
+        self._blocks.append(np.concatenate(self._latest))
+        self._length += self._latest_length
+        self._latest, self._latest_length = [], 0
         while self._length - len(self._blocks[0]) >= HISTORY:
             self._length -= len(self._blocks.popleft())
 
@@ -98,7 +106,8 @@ class BridgeErrors:
         """
         due = min(_ANEW, self._total // 8)
         if self._found_at is None or self._total - self._found_at >= due:
-            self._values = np.concatenate([*self._blocks, np.empty((0, 3))])[-HISTORY:]
+            self._values = np.concatenate(
+                [*self._blocks, *self._latest, np.empty((0, 3))])[-HISTORY:]
             self._structure = _structure(self._values, self.longest + 2)
             self._curvature = _curvature(self._values)
             self._found_at = self._total

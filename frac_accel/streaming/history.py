@@ -14,6 +14,8 @@ This part is taken out of the output. What is left is random:
 Behind a high-pass the level is known to be nothing, and the part is bounded by the motion's size.
 """
 
+import bisect
+
 import numpy as np
 
 # Samples after which the level and the spreads are no longer looked for.
@@ -45,37 +47,43 @@ class UnknownHistory:
     def __init__(self, parallel_filter, level, is_known):
         self._filter, self._level, self._is_known = parallel_filter, level[:, None], is_known
         self._count = 0
-        self._sums = np.zeros((3, len(level)))
+        self._sums = np.zeros((2, len(level), 1))
         self._seen = np.empty((len(level), LONGEST))
-        self._power = self._between = self._summed = np.zeros(len(level))
-        self._mean = np.zeros(len(level))
+        self._power = self._levels = self._summed = np.zeros((len(level), 1))
+        self._mean = np.zeros((len(level), 1))
         self._next, self._weighed = 1, np.empty((2, 0))
 
     def process(self, values):
         """What is to be added for the next inputs, and its variance; shapes (k, n)."""
+        if self._count + values.shape[1] <= self._next_look():
+            return self._advance(values)
         added, variance = np.empty(values.shape), np.empty(values.shape)
         start = 0
         while start < values.shape[1]:
-            looks = [look for look in _LOOKS if look > self._count]
-            stop = min(values.shape[1], start + (looks[0] - self._count if looks else LONGEST))
+            stop = min(values.shape[1], start + self._next_look() - self._count)
             piece = slice(start, stop)
             added[:, piece], variance[:, piece] = self._advance(values[:, piece])
             start = stop
         return added, variance
 
+    def _next_look(self):
+        """Number of samples up to which nothing is found anew."""
+        at = bisect.bisect_right(_LOOKS, self._count)
+        return _LOOKS[at] if at < len(_LOOKS) else self._count + LONGEST
+
     def _advance(self, values):
-        number = self._count + 1.0 + np.arange(values.shape[1])
+        number = np.arange(self._count + 1.0, self._count + 1.0 + values.shape[1])
         self._count += values.shape[1]
         mean = (self._means(values - self._level, number) if self._count <= LONGEST
-                else self._mean[:, None])
+                else self._mean)
         total, single = self._weights(len(number))
         if self._is_known:
-            added, variance = np.zeros(values.shape), self._power[:, None] * total**2
+            added, variance = np.zeros(values.shape), self._power * total**2
         else:
-            unknown = _LEVELS * self._between[:, None] + self._power[:, None] * (_FEW / number)**2
+            unknown = self._levels + self._power * (_FEW / number)**2
             added = mean * total
-            variance = unknown * total**2 + _SUMS * self._summed[:, None] * single**2
-        if self._count in _LOOKS:
+            variance = unknown * total**2 + self._summed * single**2
+        if self._count <= LONGEST and self._count in _LOOKS:
             self._look()
         return added, variance
 
@@ -83,23 +91,21 @@ class UnknownHistory:
         """Weighted means (k, n) of the distances from the level up to each sample."""
         self._seen[:, self._count - len(number):self._count] = apart
         at = number - 0.5
-        sums = []
-        for i, weight in enumerate((np.ones(len(at)), at, at**2)):
-            # one after the other, so that the sum does not depend on the block's length
-            sums.append(np.add.accumulate(
-                np.concatenate([self._sums[i][:, None], weight * apart], axis=1), axis=1)[:, 1:])
-            self._sums[i] = sums[-1][:, -1]
-        mean = 6 / (number * number * number) * (number * sums[1] - sums[2])
-        self._mean = mean[:, -1]
+        weighted = np.stack([apart * at, apart * at**2])
+        # one after the other, so that the sum does not depend on the block's length
+        sums = np.add.accumulate(np.concatenate([self._sums, weighted], axis=2), axis=2)[:, :, 1:]
+        self._sums = sums[:, :, -1:]
+        mean = 6 / (number * number * number) * (number * sums[0] - sums[1])
+        self._mean = mean[:, -1:]
         return mean
 
     def _look(self):
         seen = self._seen[:, :self._count]
-        self._power = np.mean(seen**2, axis=1)
+        self._power = np.mean(seen**2, axis=1, keepdims=True)
         quarters = [part.mean(axis=1) for part in np.array_split(seen, min(4, seen.shape[1]), 1)]
-        self._between = np.var(quarters, axis=0, ddof=1) / len(quarters)
+        self._levels = _LEVELS * (np.var(quarters, axis=0, ddof=1) / len(quarters))[:, None]
         about = np.cumsum(seen - seen.mean(axis=1, keepdims=True), axis=1)
-        self._summed = np.mean(about**2, axis=1)
+        self._summed = _SUMS * np.mean(about**2, axis=1, keepdims=True)
         if self._count == _LOOKS[-1]:
             self._seen = None
 

@@ -50,6 +50,14 @@ class Window:
                 or self._count - len(self._blocks[0][0]) >= MOST_SAMPLES):
             self._count -= len(self._blocks.popleft()[0])
 
+    def add_all(self, stamps_ns, values):
+        """Append blocks of samples, many small ones as one."""
+        together = np.concatenate(stamps_ns), np.concatenate(values)
+        if len(together[0]) <= MOST_SAMPLES and not (np.diff(together[0]) < 0).any():
+            stamps_ns, values = [together[0]], [together[1]]
+        for block in zip(stamps_ns, values):
+            self.add(*block)
+
     def clear(self):
         """Forget all samples."""
         self._blocks.clear()
@@ -61,7 +69,7 @@ class Window:
             return np.empty(0, np.int64), np.empty((0, 3))
         stamps = np.concatenate([block[0] for block in self._blocks])[-MOST_SAMPLES:]
         values = np.concatenate([block[1] for block in self._blocks])[-MOST_SAMPLES:]
-        finite = np.isfinite(values).all(axis=1)
+        finite = np.isfinite(values).all(axis=1) & (stamps >= stamps[-1] - self._length_ns)
         stamps, first = np.unique(stamps[finite], return_index=True)
         return stamps, values[finite][first]
 
@@ -111,10 +119,13 @@ class LiveMetrics:
 
     def _take_in(self):
         added, self._added = self._added, []
-        for raw, stamps_ns, values, arrivals_ns, now_ns in added:
-            self._raw.add(raw.stamps_ns, raw.values)
-            self._corrected.add(stamps_ns, values)
-            self._latencies_s.append(1e-9 * (now_ns - arrivals_ns))
+        if not added:
+            return
+        raw, stamps_ns, values, arrivals_ns, now_ns = zip(*added)
+        self._raw.add_all([one.stamps_ns for one in raw], [one.values for one in raw])
+        self._corrected.add_all(stamps_ns, values)
+        now_ns = np.repeat(now_ns, [len(one) for one in arrivals_ns])
+        self._latencies_s.append(1e-9 * (now_ns - np.concatenate(arrivals_ns)))
 
     def snapshot(self, reference, design):
         """`Snapshot` of now.

@@ -18,7 +18,7 @@ from .history import UnknownHistory
 from .monitors import FAULTS, NOT_CONNECTED, AxisMonitors
 from .plausibility import Plausibility, stated_range
 from .temperature import HeldTemperature
-from .timing import LARGEST, RATE_SAMPLES, SampleClock, tells_rate
+from .timing import LARGEST, RATE_SAMPLES, SampleClock, joined, tells_rate
 
 # Variance of a faulty axis [output units squared]: no fusion filter gives it any weight.
 DISTRUSTED = 1e9
@@ -27,6 +27,8 @@ _LASTING_S = 10.0
 ON_FAULT = ("covariance", "drop", "report")
 # Samples kept for a change of model: the new filter starts with these behind it.
 HISTORY = 4096
+# Samples that are put together in it at a time, at least.
+_TOGETHER = 64
 # Most samples that are held while their stamps do not advance.
 HELD = 100_000
 # Largest stamp that an int64 can hold.
@@ -318,7 +320,7 @@ class Stream:
         self._wishes = wishes
         self._use(design)
         self._begin()
-        return _concatenated([self._advance(run) for run in self._history])
+        return _concatenated([self._advance(run) for run in [*self._history, *self._latest]])
 
     def _adopt(self, model):
         """Take a model as the one in use."""
@@ -492,10 +494,17 @@ class Stream:
 
     def _forget(self):
         self._history, self._history_length = collections.deque(), 0
+        self._latest, self._latest_length = [], 0
 
     def _remember(self, run):
-        self._history.append(run)
-        self._history_length += len(run.index)
+        self._latest.append(run)
+        self._latest_length += len(run.index)
+        if self._latest_length < _TOGETHER:
+            return
+        # runs of one sample each take twenty times the memory of their samples
+        self._history += joined(self._latest)
+        self._history_length += self._latest_length
+        self._latest, self._latest_length = [], 0
         while self._history_length - len(self._history[0].index) >= HISTORY:
             self._history_length -= len(self._history.popleft().index)
 
@@ -508,7 +517,7 @@ class Stream:
             stated = ~np.isnan(variance)
             noise_known = (stated | (self._noise_variance > 0)).all(axis=1)
             variance = np.where(stated, variance, self._noise_variance)
-        if index.min() < 0:
+        if run.bridges:
             # a bridged sample is as warm as the one after it, and its variance says nothing of
             # the noise: that of the sample after it does
             following = np.where(index < 0, len(index) - 1, np.arange(len(index)))

@@ -41,6 +41,22 @@ _CHUNK = 4096
 _FOLLOWING = np.array([_FOLLOW]), np.array([1.0, _FOLLOW - 1.0])
 
 
+def _followed(late, offset):
+    """Slow mean of how late stamps are, (n,), after one that was `offset`."""
+    return run_filter(*_FOLLOWING, late[None], np.array([[(1.0 - _FOLLOW) * offset]]))[0][0]
+
+
+def _followed_by_one(late, offset):
+    """The same of a single stamp, as plain numbers."""
+    return (1.0 - _FOLLOW) * offset + _FOLLOW * late
+
+
+# Where the compiled filter rounds once for a product and a sum, as it may on some processors, plain
+# numbers would differ from it in the last bit.
+_ROUNDS_ALIKE = all(_followed(np.array([k / 7]), 1 / k)[0] == _followed_by_one(k / 7, 1 / k)
+                    for k in range(1, 100))
+
+
 def tells_rate(stamps_ns):
     """Whether stamps [ns] tell the sampling rate: not where most samples are lost between them."""
     steps = np.diff(np.asarray(stamps_ns, np.int64))
@@ -143,7 +159,7 @@ class SampleClock:
                        None if usable is None else usable[part],
                        None if finite is None else finite[part], runs)
             start = stop
-        return _joined(runs)
+        return joined(runs)
 
     def _drop(self, is_finite):
         self.counters["implausible" if is_finite else "not_finite"] += 1
@@ -186,7 +202,7 @@ class SampleClock:
 
     def _begin(self, stamp, values):
         self._origin, self._count = int(stamp), 0
-        self._offset = np.zeros(1)
+        self._offset = 0.0
         self._last, self._last_values = int(stamp), values
         self._backward = 0
         self._place += 1
@@ -195,14 +211,16 @@ class SampleClock:
 
     def _accept(self, stamps, values, finite):
         """Number of leading samples that simply follow; the clock is moved on by these."""
+        if len(stamps) == 1 and _ROUNDS_ALIKE:
+            return int((finite is None or finite[0]) and self._accept_one(stamps, values))
         steps = np.empty_like(stamps)
         np.subtract(stamps[:1], self._last, out=steps[:1])
         np.subtract(stamps[1:], stamps[:-1], out=steps[1:])
         ahead = np.arange(self._count + 1, self._count + 1 + len(stamps))
         # time against a clock that started with the first stamp; its slow mean is the clock's error
         late = (stamps - self._origin) - ahead * self.interval_ns
-        mean = run_filter(*_FOLLOWING, late[None], (1.0 - _FOLLOW) * self._offset[None])[0][0]
-        late[0] -= self._offset[0]
+        mean = _followed(late, self._offset)
+        late[0] -= self._offset
         late[1:] -= mean[:-1]
         error = np.abs(late / self.interval_ns)
         largest = error.max()
@@ -214,13 +232,23 @@ class SampleClock:
         if accepted:
             if largest > JITTER:
                 self.counters["jitter"] += int(np.count_nonzero(error[:accepted] > JITTER))
-            self._follow(stamps[:accepted], values[:accepted], mean[accepted - 1:accepted])
-            self._backward = 0
+            self._follow(stamps[:accepted], values[:accepted], float(mean[accepted - 1]))
         return accepted
+
+    def _accept_one(self, stamps, values):
+        """`_accept` for a single sample, without arrays."""
+        stamp = int(stamps[0])
+        late = (stamp - self._origin) - (self._count + 1) * self.interval_ns
+        error = abs((late - self._offset) / self.interval_ns)
+        if stamp <= self._last or not error < MISSING:
+            return False
+        self.counters["jitter"] += error > JITTER
+        self._follow(stamps, values, _followed_by_one(late, self._offset))
+        return True
 
     def _follow(self, stamps, values, offset):
         self._errors.add(values)
-        self._offset = offset
+        self._offset, self._backward = offset, 0
         self._count += len(stamps)
         self._place += len(stamps)
         self._last, self._last_values = int(stamps[-1]), values[-1]
@@ -240,7 +268,7 @@ class SampleClock:
             self._drop(is_number)
             return None
         late = (int(stamp) - self._origin) - (self._count + 1) * self.interval_ns
-        missing = int(round((late - self._offset[0]) / self.interval_ns))
+        missing = int(round((late - self._offset) / self.interval_ns))
         if missing < 0:
             self.counters["early"] += 1
             return None
@@ -281,7 +309,7 @@ class SampleClock:
         return np.empty(0, np.int64), np.empty((0, 3)), None
 
 
-def _joined(runs):
+def joined(runs):
     """Runs that continue each other made one."""
     if len(runs) < 2:
         return runs
