@@ -14,6 +14,7 @@ from rclpy.serialization import deserialize_message, serialize_message  # noqa: 
 from ros_processes import ros_domain  # noqa: E402
 from rosbags.typesys import Stores, get_typestore  # noqa: E402
 from sensor_msgs.msg import Imu  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
 
 from frac_accel.io import cdr  # noqa: E402
 from frac_accel.nodes._channel import _node_of  # noqa: E402
@@ -135,6 +136,29 @@ def test_direct_subscriptions_need_no_executor_and_fall_back_on_it(node):
     publish_serialized(publisher, sent[10:])
     spin_until(executor, lambda: len(received()) == 20)
     assert received() == sent
+
+
+def test_the_executor_has_a_turn_where_a_service_waits_and_none_otherwise(node):
+    publisher = node.create_publisher(Imu, "/imu/data_raw", 100)
+    batches = []
+    RawSubscription(node, Imu, "/imu/data_raw", batches.append, QoSProfile(depth=100),
+                    is_direct=True)
+    node.create_service(Trigger, "~/ask", lambda _, response: response)
+    client = node.create_client(Trigger, "~/ask")
+    assert client.wait_for_service(20)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    while publisher.get_subscription_count() == 0:
+        time.sleep(0.01)
+    intake = DirectIntake(node)
+    publish_serialized(publisher, [message(0)])
+    assert not intake.wait(0.3)
+    assert [one.data for batch in batches for one in batch] == [message(0)]
+    future = client.call_async(Trigger.Request())
+    start = time.monotonic()
+    assert intake.wait(5.0)
+    assert time.monotonic() - start < 2.0
+    spin_until(executor, future.done)
 
 
 def test_a_topic_that_never_falls_silent_leaves_time_for_the_rest(node):

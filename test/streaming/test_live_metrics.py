@@ -107,6 +107,19 @@ def test_a_window_is_bounded_in_time_and_number():
     assert window.samples()[0][-1] == stamps(3 * MOST_SAMPLES)[-1]
 
 
+@pytest.mark.parametrize("size", [1, 7, 300])
+def test_a_window_is_the_same_however_its_samples_come(size):
+    metrics, window = LiveMetrics(1.0), Window(1.0)
+    at = stamps(3000)
+    for start in range(0, 3000, size):
+        raw = Samples.of(at[start:start + size], motion(at[start:start + size]))
+        metrics.add(raw, raw.stamps_ns, raw.values, raw.stamps_ns, 0)
+        window.add(raw.stamps_ns, raw.values)
+    found, _ = metrics.snapshot(None, None).raw
+    np.testing.assert_array_equal(found, window.samples()[0])
+    np.testing.assert_array_equal(found, at[at >= at[-1] - 10**9])
+
+
 def test_a_window_drops_what_cannot_be_judged():
     window = Window(1.0)
     at = stamps(6)[[0, 1, 1, 3, 2, 5]]
