@@ -22,6 +22,9 @@ _P_VALUE = 0.1
 _STRETCHES = 20
 # Of the stretches at rest, the one whose scatter counts.
 _QUIETEST = 0.25
+# Share of the power at rest within so many lines of one above the lowest ones that is no noise: a
+# motor that runs, or a tone.
+_NARROW, _LINES, _LOWEST = 0.7, 2, 5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +80,10 @@ def established_noise(residual, measured, reference, used, sampling_rate_hz, cov
     if period is None:
         period = recognise(moving, sampling_rate_hz).period_samples \
             if np.ptp(moving) and len(moving) >= 64 else 0
-    at_rest = _rest(measured, reference, used, sampling_rate_hz)
+    at_rest, narrow_hz = _rest(measured, reference, used, sampling_rate_hz)
+    if narrow_hz:
+        words.append(f"at rest the sensor shows a narrow band around {narrow_hz:.3g} Hz: what acts "
+                     "on it there is no noise")
     left = float(np.sqrt(np.mean(residual[used]**2))) if used.any() else 0.0
     if _given(stated_std):
         if at_rest is not None and not 1 / _FAR < stated_std / max(at_rest, 1e-300) < _FAR:
@@ -155,7 +161,8 @@ def _untrusted(std, seen, left):
 
 
 def _rest(measured, reference, used, rate):
-    """Scatter of the sensor where the reference is at rest, or None.
+    """Scatter of the sensor where the reference is at rest, or None; and the frequency [Hz] of the
+    narrow band that it mainly is, for which there is none, or None.
 
     Where values on a lattice do not scatter at all, what rounding adds once they move.
     """
@@ -163,7 +170,7 @@ def _rest(measured, reference, used, rate):
     count = len(measured) // length
     moving = reference - reference[used].mean(axis=0) if used.any() else reference
     whole = np.sqrt(np.sum(moving**2) / max(len(moving), 1))
-    found = []
+    found, power = [], 0.0
     line = np.stack([np.ones(length), np.linspace(-1, 1, length)], axis=1)
     line, _ = np.linalg.qr(line)
     for place in range(count):
@@ -174,14 +181,18 @@ def _rest(measured, reference, used, rate):
         if np.sqrt(np.sum(part**2) / length) < _AT_REST * whole:
             values = measured[rows] - line @ (line.T @ measured[rows])
             found.append(np.sqrt(values @ values / (length - 2)))
+            power = power + np.abs(np.fft.rfft(values * np.hanning(length)))**2
     if not found:
-        return None
+        return None, None
+    peak = _LOWEST + int(np.argmax(power[_LOWEST:]))
+    if power[peak - _LINES:peak + _LINES + 1].sum() > _NARROW * power.sum():
+        return None, peak * rate / length
     # the sensor may still ring in some of them
     scatter = float(np.quantile(found, _QUIETEST))
     step = _lattice(measured[used])
     if step and scatter < step / np.sqrt(12):
         scatter = float(step / np.sqrt(12))
-    return scatter if scatter > 0 else None
+    return (scatter if scatter > 0 else None), None
 
 
 def _lattice(values):

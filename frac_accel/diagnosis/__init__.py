@@ -31,6 +31,7 @@ from .leftover import related
 from .read_off import drowned
 from .screened import screened
 from .spikes import spikes, spikes_words
+from .sprung import beside_spring, is_bent, is_better, oscillator_of
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
 from .stretches import MOST, strongest_part
 from .time_limit import TimeLimit
@@ -133,18 +134,23 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if poor:
         return insufficient(poor, model, found)
     stds, seed, rival = _stated(model, axis) if model else {}, None, None
-    if model is None:
+    is_stated = model is not None
+    if not is_stated:
         stages.enter("identifying a classical model", IDENTIFIED)
         model, stds, seed, rival = _classical(record, axis, used, limit)
-    # the common lag of the stamps is a median of scattered ones
-    loose = _left_open(model.axis(axis), stds, 1.25 * found.jitter_rms_s / np.sqrt(found.samples))
-    begin = functools.partial(
-        Engine, record.comparable(column, used), column, model,
-        base=_in_every_fit(loose, shown), candidates=_candidates(model.axis(axis).core),
-        stages=stages, step=found.step, limit=limit,
-        passed_on=None if noise and noise.bends else noise, loose=loose,
-        in_own_core=[cause for cause, entry in loose.items()
-                     if seed is not None and entry.effect.restates_core])
+
+    def engine_of(model, stds, seed):
+        # the common lag of the stamps is a median of scattered ones
+        loose = _left_open(model.axis(axis), stds,
+                           1.25 * found.jitter_rms_s / np.sqrt(found.samples))
+        return functools.partial(
+            Engine, record.comparable(column, used), column, model,
+            base=_in_every_fit(loose, shown), candidates=_candidates(model.axis(axis).core),
+            stages=stages, step=found.step, limit=limit,
+            passed_on=None if noise and noise.bends else noise, loose=loose,
+            in_own_core=[cause for cause, entry in loose.items()
+                         if seed is not None and entry.effect.restates_core])
+    begin = engine_of(model, stds, seed)
     engine, stray = _without_spikes(begin, used, stray, record.reference[:, column])
     if stray.any():
         found.words.append(spikes_words(stray.sum()))
@@ -153,6 +159,8 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     engine.identified = {cause: effect for cause, effect in (seed or {}).items() if effect.everyday}
     _require_relation(engine, axis, seed)
     best = engine.run(seed)
+    if not is_stated and is_bent(engine, best):
+        begin, engine, best, seed = _with_a_spring(begin, engine, best, seed, engine_of, record)
     if engine.part is None:
         engine, best = _without_start(begin, engine, best, found)
         engine, best = _without_drowned(begin, engine, best, found, seed)
@@ -244,6 +252,25 @@ def _without_spikes(engine, used, stray, reference):
     more = p.put_back(inside & spikes(first.search.baseline.residual,
                                       p.taken(reference)), np.zeros(len(used), bool))
     return (engine(used=used & ~more) if more.any() else first), stray | more
+
+
+def _with_a_spring(begin, engine, best, seed, engine_of, record):
+    """Engine with the oscillator that the gain of another one may hide, what begins and seeds it,
+    and its best set; those given where it explains nothing more."""
+    p = engine.problem
+    if p.limit.ends_search("no oscillator was tried in the gain's place"):
+        return begin, engine, best, seed
+    found = oscillator_of(record, AXES[p.axis], engine.wanted)
+    if found is None:
+        return begin, engine, best, seed
+    model, own_seed = found
+    own_begin = engine_of(model, dict.fromkeys(_CORE, np.inf), own_seed)
+    other = _beside(own_begin, engine, np.zeros(len(engine.wanted), bool))
+    other.spikes, other.aside = engine.spikes, engine.aside
+    other.search.candidates = beside_spring(engine, best)
+    own_best = other.run(own_seed)
+    return (own_begin, other, own_best, own_seed) if is_better(best, own_best) \
+        else (begin, engine, best, seed)
 
 
 def _without_drowned(begin, engine, best, found, seed):

@@ -194,7 +194,7 @@ class Engine:
                 if cause in self.search.base or \
                         self.rms(self.added(best, cause)) < WEIGHS * unexplained:
                     continue
-                if self.problem.limit.ends_search("not every cause met its rivals"):
+                if self.problem.limit.ends_rivalry("not every cause met its rivals"):
                     self.uncontested.add(cause)
                     continue
                 less = self.search.without(best, cause, best.cost + self.threshold(best))

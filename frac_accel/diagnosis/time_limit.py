@@ -7,7 +7,9 @@ from ..simulation.compiling import compiled_s
 
 # Share of the budget after which nothing new is tried, so that what is known can be judged; and in
 # a part of a long record, the whole of which has to be fitted, too.
-_SEARCH, _SEARCH_IN_PART = 0.75, 0.4
+_SEARCH, _SEARCH_IN_PART = 0.75, 0.45
+# The same for the rivals of what was found, without which nothing has a name.
+_RIVALS, _RIVALS_IN_PART = 0.85, 0.65
 
 
 class TimeLimit:
@@ -28,12 +30,12 @@ class TimeLimit:
         self.seconds = seconds
         self._start = time.process_time() - compiled_s()
         self.left_out = []
-        self._search = _SEARCH
+        self._search, self._rivals = _SEARCH, _RIVALS
 
     def of_part(self):
         """The same budget for the search in a part of a long record."""
         limit = copy.copy(self)
-        limit._search = _SEARCH_IN_PART
+        limit._search, limit._rivals = _SEARCH_IN_PART, _RIVALS_IN_PART
         return limit
 
     def spent_s(self):
@@ -43,6 +45,10 @@ class TimeLimit:
     def ends_search(self, words=None):
         """Whether the search must end; notes what is left out because of it."""
         return self._over(self._search, words)
+
+    def ends_rivalry(self, words=None):
+        """Whether the rivals of what was found are no longer tried; notes it as `ends_search`."""
+        return self._over(self._rivals, words)
 
     def ends_judging(self, words=None):
         """Whether nothing that can be spared is done any more."""

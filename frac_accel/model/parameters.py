@@ -90,9 +90,12 @@ class Scales:
         return low * unit, high * unit
 
 
-def coefficients():
-    """Declare a list of numbers of a core or an effect."""
-    return dataclasses.field(metadata={"list": True})
+def coefficients(unit="", default=None):
+    """Declare a list of numbers of a core or an effect, all of one unit."""
+    metadata = {"list": True, "unit": unit}
+    if default is None:
+        return dataclasses.field(metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
 
 
 def choice(*words):
@@ -132,9 +135,13 @@ def unit_power(field):
 
 def rescaled(instance, factor):
     """The same where the output that it acts on is so many times as large."""
-    return dataclasses.replace(instance, **{
-        field.name: getattr(instance, field.name) * factor**unit_power(field)
-        for field in parameter_fields(type(instance)) if unit_power(field)})
+    changed = {}
+    for field in parameter_fields(type(instance)):
+        if unit_power(field):
+            value, scale = getattr(instance, field.name), factor**unit_power(field)
+            changed[field.name] = tuple(scale * each for each in value) \
+                if isinstance(value, tuple) else scale * value
+    return dataclasses.replace(instance, **changed)
 
 
 def build(cls, mapping, where):

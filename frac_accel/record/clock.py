@@ -25,6 +25,9 @@ _PARTS = 8
 # clock's: normal scatter of a third of an interval comes to 0.48.
 _MOST = 85
 _UNEVEN = 0.5
+# Scatter [intervals] about a line of stamps of which none is lost: a lost one in the middle, beside
+# such a scatter that rounding fails, makes it 0.33.
+_COMPLETE = 0.3
 # Robust scatter [intervals] of those that are not late, and their share, where stamps are a uniform
 # clock's with delays.
 _PUNCTUAL = 0.1
@@ -285,11 +288,14 @@ def _ticked(seconds):
 
 
 def _delayed(seconds):
-    """Clock of stamps of which many are late, but no sample is lost; or None."""
+    """Clock of stamps of which many are late or scatter much, but no sample is lost; or None."""
     interval, count = typical_interval(seconds), np.arange(len(seconds), dtype=float)
     line, late, kept = _robust_line(count, seconds, interval)
     if np.mean(kept) < _FEWEST_PUNCTUAL or _deviation(late[kept]) > _PUNCTUAL * line[0]:
-        return None
+        line = np.polyfit(count, seconds, 1)
+        late, kept = seconds - np.polyval(line, count), slice(None)
+        if np.std(late) > _COMPLETE * line[0]:
+            return None
     return Clock("regular", float(1 / line[0]), float(line[1] + np.median(late[kept])), count,
                  float(np.std(late[kept])))
 

@@ -1,7 +1,5 @@
 """Samples that were taken where their scattering stamps say, put on uniform instants."""
 
-import dataclasses
-
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 from scipy.interpolate import make_interp_spline
@@ -44,11 +42,9 @@ def put_on_instants(topic):
     for _ in range(_ROUNDS):
         spline = make_interp_spline(grid, values, _DEGREE)
         values[slot] += measured - spline(place)
-    scatter, topic.values = clock.scatter_s, values[slot]
-    topic.stamps_ns = topic.stamps_ns - np.round(1e9 * late / clock.rate_hz).astype(np.int64)
-    topic.clock = dataclasses.replace(clock, scatter_s=0.0, start_s=-clock.slot[0] / clock.rate_hz)
+    topic.move(values[slot], late / clock.rate_hz)
     return [f"the {topic.name}'s samples were taken where their stamps say, which scatter by "
-            f"{scatter:.3g} s (RMS): they are put on uniform instants"]
+            f"{clock.scatter_s:.3g} s (RMS): they are put on uniform instants"]
 
 
 def _share_shown(values, slot, late):

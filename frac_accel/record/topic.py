@@ -77,6 +77,8 @@ class Topic:
         Their places among all samples; None where all are usable.
     duplicates, stamps_back, not_finite : int
         Numbers of the others.
+    is_moved : bool
+        Whether the values are no longer those that were published, but those of other instants.
 
     Raises
     ------
@@ -104,7 +106,7 @@ class Topic:
             self.duplicates = int(np.sum(np.diff(samples.stamps_ns[finite]) == 0)
                                   - np.sum(np.diff(self.stamps_ns) == 0))
             self.stamps_back = max(len(good) - len(self) - self.duplicates - self.not_finite, 0)
-        self._found = {}
+        self._found, self.is_moved = {}, False
 
     def __len__(self):
         return len(self.stamps_ns)
@@ -123,6 +125,21 @@ class Topic:
         """Move all stamps; what has been found of them holds as it is."""
         self.stamps_ns = self.stamps_ns + round(seconds * 1e9)
         self._useless = self._useless + round(seconds * 1e9)
+
+    def move(self, values, late_s):
+        """Have the values, shape (n, 3), of instants so much earlier.
+
+        Lattice and limits stay those of what was published, and what was at a limit stays there.
+        """
+        for column in range(3):
+            published, (lower, upper) = self.values[:, column], self.limits(column)
+            for limit in (lower, upper):
+                if limit is not None:
+                    values[published == limit, column] = limit
+        self.clock = dataclasses.replace(self.clock, scatter_s=0.0,
+                                         start_s=-self.clock.slot[0] / self.clock.rate_hz)
+        self.stamps_ns = self.stamps_ns - np.round(1e9 * late_s).astype(np.int64)
+        self.values, self.is_moved = values, True
 
     @functools.cached_property
     def missing(self):
@@ -162,7 +179,7 @@ class Topic:
             words.append(f"a bit is stuck: the one that is worth {stuck:.6g} is the same in all "
                          "values")
         words += at_limits(self.values[:, column], lower, upper)
-        if not own_instants:
+        if self.is_moved or not own_instants:
             step = None
         return Integrity(len(self), self.missing, self.duplicates,
                          self.stamps_back, self.not_finite, jitter, step, lower, upper, words)

@@ -204,6 +204,17 @@ class Effect:
         """
         return {}
 
+    @classmethod
+    def column(cls, values):
+        """What is added to samples, shape (n,), where its course in time is 1, by one that may have
+        any (`in_course`); None for others."""
+        return None
+
+    @classmethod
+    def in_course(cls, time_s, values):
+        """Effect that has these values at these instants [s], in `column`'s units."""
+        raise NotImplementedError(cls.cause)
+
     def alternatives(self):
         """Effects of this cause to go on from that differ in what no fit varies, such as an order.
 

@@ -1,11 +1,12 @@
-"""Sensitivity that changes steadily with time."""
+"""Sensitivity that changes slowly with time."""
 
 import dataclasses
 
 import numpy as np
 
-from ..parameters import parameter
+from ..parameters import coefficients, parameter
 from .base import GAIN, Effect
+from .course import about_line, along, require_course
 from .fit_starts import free
 
 _LEAST = 1e-3
@@ -13,7 +14,7 @@ _LEAST = 1e-3
 
 @dataclasses.dataclass(frozen=True)
 class GainDrift(Effect):
-    """Gain 1 + rate t, t from the record's start."""
+    """Gain 1 + rate t, t from the record's start, and a course of its own, where it has one."""
 
     cause = "gain_drift"
     stage = GAIN
@@ -23,6 +24,11 @@ class GainDrift(Effect):
     experiment = "Keep level and temperature constant for longer: a drift goes on with time."
 
     rate_per_s: float = parameter("1/s", scale="per_duration", null=0.0)
+    course_at_s: tuple = coefficients("s", ())
+    course: tuple = coefficients("1", ())
+
+    def __post_init__(self):
+        require_course(self.cause, self.course_at_s, self.course)
 
     def simulate(self, values, circumstances):
         return values * self._gain(circumstances)
@@ -34,7 +40,16 @@ class GainDrift(Effect):
         return values / gain, variance / gain**2
 
     def _gain(self, circumstances):
-        return 1 + self.rate_per_s * circumstances.time_s
+        return (1 + self.rate_per_s * circumstances.time_s
+                + along(circumstances.time_s, self.course_at_s, self.course))
+
+    @classmethod
+    def column(cls, values):
+        return values
+
+    @classmethod
+    def in_course(cls, time_s, values):
+        return cls(*about_line(time_s, values))
 
     @classmethod
     def starts(cls, view):

@@ -32,9 +32,9 @@ class Quantization(Effect):
 
     @classmethod
     def recognised(cls, seen, shown):
-        if "sensor" not in seen.record.resampled:
+        if seen.found.step:
             return super().recognised(seen, shown)
-        # the values on other instants have no lattice
+        # values that were put on other instants have no lattice; what was published has
         step = seen.record.step("sensor", seen.axis)
         reading = cls(step).reading(seen) if step else None
         return (cls(step), reading) if reading is not None \
@@ -46,7 +46,8 @@ class Quantization(Effect):
         What rounding has added is then known by its power alone, step**2 / 12 (B. Widrow,
         I. Kollar, *Quantization Noise* (2008)).
         """
-        if not seen.is_coarse and "sensor" not in seen.record.resampled:
+        moved = seen.found.step is None
+        if not (seen.is_coarse or moved):
             return None
         values, output, used = seen.as_recorded()
         before = (values - output)[used]
@@ -56,7 +57,7 @@ class Quantization(Effect):
             after = _without(before, share)
         return Reading({"step": 1e-6 * self.step}, before, after,
                        next(words for words in seen.found.words if "multiples" in words),
-                       evident="sensor" in seen.record.resampled)
+                       evident=moved)
 
     def simulate(self, values, circumstances):
         return self.step * np.round(values / self.step)
