@@ -22,6 +22,7 @@ from ..record.clipping import at_limits
 from ..record.orientation import Orientation, turned_away
 from ..record.sources import pair_of
 from ..simulation import AxisSimulator
+from .courses import course_of, is_worth_it
 from .engine import Engine
 from .event import event, start
 from .finding import Diagnosis, Finding, insufficient
@@ -161,6 +162,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     best = engine.run(seed)
     if not is_stated and is_bent(engine, best):
         begin, engine, best, seed = _with_a_spring(begin, engine, best, seed, engine_of, record)
+    begin, engine, best = _with_a_course(begin, engine, best, seed)
     if engine.part is None:
         engine, best = _without_start(begin, engine, best, found)
         engine, best = _without_drowned(begin, engine, best, found, seed)
@@ -273,6 +275,20 @@ def _with_a_spring(begin, engine, best, seed, engine_of, record):
         else (begin, engine, best, seed)
 
 
+def _with_a_course(begin, engine, best, seed):
+    """Engine that looks for all else beside what changes slowly, what begins it, and its best set;
+    those given where nothing does."""
+    courses = course_of(engine, best)
+    if not courses or engine.problem.limit.ends_search(
+            "nothing was looked for beside what changes slowly"):
+        return begin, engine, best
+    own_begin = functools.partial(begin, base={**begin.keywords["base"], **courses})
+    other = _beside(own_begin, engine, np.zeros(len(engine.wanted), bool))
+    other.spikes, other.aside, other.search.courses = engine.spikes, engine.aside, courses
+    own_best = other.run(seed)
+    return (own_begin, other, own_best) if is_worth_it(best, own_best) else (begin, engine, best)
+
+
 def _without_drowned(begin, engine, best, found, seed):
     """Engine whose fits leave out the samples in which what the record shows by itself, or what
     happened once, drowns all else, and its best set; those given where there are none."""
@@ -307,6 +323,7 @@ def _beside(begin, engine, hidden):
     """The same engine without some samples that count."""
     other = begin(used=engine.wanted & ~hidden)
     other.at_limit, other.identified, other.found = engine.at_limit, engine.identified, engine.found
+    other.search.courses = engine.search.courses
     return other
 
 

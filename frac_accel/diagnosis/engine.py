@@ -149,6 +149,7 @@ class Engine:
                                self._step, p.limit.of_part(), self.passed_on, self.loose,
                                p.in_own_core)
             self.part.identified, self.part.found = self.identified, self.found
+            self.part.search.courses = self.search.courses
             return self.part.run(seed)
         self.best = self.compete(self.search.run(
             self.threshold, self.promises, self.noise_only, seed,

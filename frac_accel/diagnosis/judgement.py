@@ -12,6 +12,7 @@ from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.effects import IDENTIFIED, effect_of, known_effects
 from ..model.effects.base import OFFSET
+from . import courses
 from .doubts import (
     by_what_is_left,
     delay_of_unseen_core,
@@ -296,8 +297,9 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         fraction = _remaining(engine, fitted, left.noise_rms)
     # beside the model as it is in the end, not beside one with what is only suspected
     away, near = _moved(engine, fitted, stds)
-    suspects += [_suspect({cause}, 0.0, words) for cause, words in near.items()]
-    findings = [*findings, *away, *shown_by(fitted)]
+    drifts, other_course = courses.findings(engine, fitted, stds)
+    suspects += [_suspect({cause}, 0.0, words) for cause, words in (near | other_course).items()]
+    findings = [*findings, *away, *drifts, *shown_by(fitted)]
     if any(f.effect.goes_with_size for f in findings):
         left = dataclasses.replace(left, level_score=0.0)
         fraction = fraction if left.share > 0 else 0.0

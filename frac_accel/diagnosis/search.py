@@ -88,6 +88,8 @@ class Search:
     def __init__(self, problem, base=None, candidates=(), stages=None):
         self.problem, self.base = problem, base or {}
         self.candidates = candidates
+        # of the base, what has a course in time of its own, beside which all else is looked for
+        self.courses = {}
         self.fits = {}
         self.screens, self._starts = {}, {}
         self.stages = stages or Stages(None, problem.limit)
@@ -115,8 +117,9 @@ class Search:
 
     @property
     def baseline(self):
-        """The model in use, with what is free in every fit."""
-        return self.fit(self.base)
+        """The model in use, with what is free in every fit but for courses in time."""
+        return self.fit({cause: effect for cause, effect in self.base.items()
+                         if cause not in self.courses})
 
     def to_its_best(self, fitted):
         """A fit that what is reported rests on: trials end as soon as they cannot win."""

@@ -132,6 +132,8 @@ class Effect:
     shows_with_time: ClassVar[bool] = False
     # True for what counts its time from a record's first sample, so that it is of that record alone
     counts_from_start: ClassVar[bool] = False
+    # numbers of half waves over a record that its course in time may have (`in_course`)
+    half_waves: ClassVar[tuple[int, ...]] = ()
     # True for what acts on slow motion, which the strongest part of a record may lack
     acts_on_slow_motion: ClassVar[bool] = False
     # True for what is so common and so cheap to fit that every search begins with it, too
@@ -206,13 +208,12 @@ class Effect:
 
     @classmethod
     def column(cls, values):
-        """What is added to samples, shape (n,), where its course in time is 1, by one that may have
-        any (`in_course`); None for others."""
-        return None
+        """What is added to samples, shape (n,), where its course in time is 1."""
+        raise NotImplementedError(cls.cause)
 
     @classmethod
     def in_course(cls, time_s, values):
-        """Effect that has these values at these instants [s], in `column`'s units."""
+        """Effect that has these values at these instants [s]; of one with `half_waves`."""
         raise NotImplementedError(cls.cause)
 
     def alternatives(self):

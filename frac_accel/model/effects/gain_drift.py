@@ -21,6 +21,8 @@ class GainDrift(Effect):
     explanation = "The sensitivity drifts with time."
     shows_with_time = True
     counts_from_start = True
+    # with four periods it is a modulation
+    half_waves = (1, 2, 3, 5, 7)
     experiment = "Keep level and temperature constant for longer: a drift goes on with time."
 
     rate_per_s: float = parameter("1/s", scale="per_duration", null=0.0)

@@ -20,6 +20,7 @@ class OffsetDrift(Effect):
                    "gravity along a slow tilt.")
     shows_with_time = True
     counts_from_start = True
+    half_waves = (1, 2, 3, 5, 7, 10, 14)
     experiment = ("Record at rest and at constant temperature for longer: a drifting zero goes on "
                   "with time.")
 
