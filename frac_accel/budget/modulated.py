@@ -9,6 +9,11 @@ from .filters import solve
 _STRETCHES = 4
 
 
+def cosines(place, orders):
+    """Cosines of some orders at places along the record, shape (n, orders)."""
+    return np.cos(np.pi * np.outer(place, orders))
+
+
 class Modulated:
     r"""Cross-validated predictions :math:`p_t = \sum_j c_j(t) \sum_m w_{jm} \cos(\pi m t / T)`.
 
@@ -34,11 +39,15 @@ class Modulated:
             rights.append(matrix.T @ target[start:stop])
         self._folds, self._grams, self._rights = map(np.array, (folds, grams, rights))
 
-    def predict(self, orders):
-        """Prediction, shape (n,), by cosines of certain orders m; 0 is a constant weight."""
+    def predict(self, orders, courses=cosines):
+        """Prediction, shape (n,), by cosines of certain orders m; 0 is a constant weight.
+
+        Other `courses` are columns at places from 0 to 1 along the record, given these and the
+        orders.
+        """
         centre = np.array([(start + stop) / 2 for start, stop in self._runs]) / self._n
-        course = np.cos(np.pi * np.outer(centre, orders))
-        count, columns = len(orders), self._grams.shape[1]
+        course = courses(centre, orders)
+        count, columns = course.shape[1], self._grams.shape[1]
         result = np.zeros(self._n)
         for fold in range(FOLDS):
             judged = self._folds == fold

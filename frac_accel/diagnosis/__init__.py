@@ -22,7 +22,7 @@ from ..record.clipping import at_limits
 from ..record.orientation import Orientation, turned_away
 from ..record.sources import pair_of
 from ..simulation import AxisSimulator
-from .courses import course_of, is_worth_it
+from .courses import begun_with, beside, course_of, is_worth_it, refined
 from .engine import Engine
 from .event import event, start
 from .finding import Diagnosis, Finding, insufficient
@@ -54,6 +54,8 @@ _EXCHANGED = 0.3
 _FOLLOWS = 0.5
 # Causes that are tried before a pair counts as exchanged.
 _TRIED = 4
+# Filters of which the best stands beside a course while that is found.
+_FILTERS = 3
 # Parameters of a classical core.
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
@@ -159,6 +161,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     engine.at_limit, engine.found = at_limit, found
     engine.identified = {cause: effect for cause, effect in (seed or {}).items() if effect.everyday}
     _require_relation(engine, axis, seed)
+    begin, engine = _beside_a_course(begin, engine, begun_with(engine), {})
     best = engine.run(seed)
     if not is_stated and is_bent(engine, best):
         begin, engine, best, seed = _with_a_spring(begin, engine, best, seed, engine_of, record)
@@ -278,15 +281,38 @@ def _with_a_spring(begin, engine, best, seed, engine_of, record):
 def _with_a_course(begin, engine, best, seed):
     """Engine that looks for all else beside what changes slowly, what begins it, and its best set;
     those given where nothing does."""
-    courses = course_of(engine, best)
+    courses = {} if engine.search.courses else course_of(engine, best)
     if not courses or engine.problem.limit.ends_search(
             "nothing was looked for beside what changes slowly"):
         return begin, engine, best
-    own_begin = functools.partial(begin, base={**begin.keywords["base"], **courses})
-    other = _beside(own_begin, engine, np.zeros(len(engine.wanted), bool))
-    other.spikes, other.aside, other.search.courses = engine.spikes, engine.aside, courses
+    own_begin, other = _beside_a_course(begin, engine, courses, best.effects)
     own_best = other.run(seed)
-    return (own_begin, other, own_best) if is_worth_it(best, own_best) else (begin, engine, best)
+    if not is_worth_it(best, own_best, courses):
+        return begin, engine, best
+    return own_begin, other, own_best
+
+
+def _beside_a_course(begin, engine, courses, effects):
+    """Engine whose every fit has these courses, found once more beside the fit of some effects (or
+    of the common ones and a filter), and what begins it; those given without any."""
+    if not courses:
+        return begin, engine
+    _, first = _with_courses(begin, engine, courses)
+    effects = {cause: effect for cause, effect in effects.items()
+               if cause in first.search.candidates}
+    if not effects:
+        common = first.everyday()
+        effects = min([common, *first.search.with_a_filter(common, _FILTERS)],
+                      key=lambda fit: fit.cost).effects
+    return _with_courses(begin, engine, refined(first, effects))
+
+
+def _with_courses(begin, engine, courses):
+    begin = functools.partial(begin, base={**begin.keywords["base"], **courses},
+                              candidates=beside(courses, begin.keywords["candidates"]))
+    other = _beside(begin, engine, np.zeros(len(engine.wanted), bool))
+    other.spikes, other.aside, other.search.courses = engine.spikes, engine.aside, courses
+    return begin, other
 
 
 def _without_drowned(begin, engine, best, found, seed):

@@ -3,13 +3,15 @@
 import numpy as np
 
 from ..budget.blocks import Blocks
-from ..budget.modulated import Modulated
+from ..budget.modulated import Modulated, cosines
 from ..model.effects import known_effects
 from ..model.effects.course import KNOTS
 from .finding import Finding
 from .gain import certainty, gain
 from .words import gain_words
 
+# Samples of a record for which it is worth a look before all else.
+_SHORT = 80_000
 # Share of what is left without a course that it must take of data that it has not seen, and by how
 # much more (power) others, such as a course of the timing, must leave.
 _TAKES, _CLEARLY = 0.5, 2.0
@@ -26,11 +28,28 @@ _ALIKE = 0.6
 _SAME_KIND = 0.3
 
 
+def begun_with(engine):
+    """As `course_of`, beside the common causes alone, where no other cause promises half as much:
+    what is so large would hide all else, and make the search for it long."""
+    p = engine.problem
+    if len(p.time) > _SHORT or p.limit.ends_search():
+        return {}
+    bare = engine.everyday()
+    found = course_of(engine, bare)
+    if not found:
+        return {}
+    promised = min((cost for cost, *_ in engine.search.screen(bare)), default=np.inf)
+    (cause, effect), = found.items()
+    kept = _without_the_like(engine, bare, type(effect))
+    return found if _CLEARLY * p.cost({**kept, cause: effect}) < promised else {}
+
+
 def course_of(engine, best):
     """The cause, as {cause: effect}, whose course in time explains most of what a fit leaves.
 
     It is judged in blocks of the record that it has not seen, beside the other courses that could
-    be meant: an offset, a gain, a delay. Empty where none takes much, or two take as much.
+    be meant: an offset, a gain, a delay. Empty where none takes much, two take as much, it may be
+    the motion's own, or a law that the fit has describes it.
 
     Parameters
     ----------
@@ -46,31 +65,48 @@ def course_of(engine, best):
         if not cls.half_waves or cause in engine.search.base:
             continue
         kept = _without_the_like(engine, best, cls)
-        target = (p.measured - p.simulate(kept)) * p.used
-        before = p.simulate({c: e for c, e in kept.items() if e.stage < cls.stage})
-        own = cls.column(before)
-        left, waves, power = _left(p, own, target, cls.half_waves)
+        target, before = _to_be_described(p, kept, cls)
+        left, waves, power = _left(p, cls.column(before), target, cls.half_waves)
         others = [_left(p, column, target, cls.half_waves)[0] for column in
-                  (np.ones(len(own)), before, np.gradient(before))
-                  if not np.array_equal(column, own)]
+                  (np.ones(len(before)), before, np.gradient(before))
+                  if not np.array_equal(column, cls.column(before))]
         if left > 1 - _TAKES or min(others) < _CLEARLY * left \
-                or (len(kept) < len(best.effects) and power > _AS_GOOD * own_power):
+                or power > _allowed(best.effects, kept) * own_power:
             continue
-        time = np.linspace(0.0, p.time[-1], KNOTS)
-        values = _curve(p, own, target, waves, time)
-        if not _follows(values, _measures(before, p.used)):
-            found.append((left, cause, cls.in_course(p.record.since_start_s + time, values)))
+        effect = _through(p, cls, before, target, waves)
+        if not _follows(_values(effect), _measures(before, p.used)):
+            found.append((left, cause, effect))
     return {cause: effect for _, cause, effect in sorted(found, key=lambda each: each[:2])[:1]}
+
+
+def beside(courses, candidates):
+    """Of some causes those that are looked for beside courses: a law of the same kind would only
+    mend what a course lacks."""
+    stages = {effect.stage for effect in courses.values()}
+    return [cause for cause in candidates for effect in [known_effects()[cause]]
+            if effect.stage not in stages or not effect.shows_with_time or effect.everyday]
+
+
+def _allowed(before, after):
+    """Share of the residual's power that a course may leave, as `_LESS` and `_AS_GOOD`: one law
+    is more than a course, several together follow any."""
+    laws = [cause for cause, effect in before.items() if cause not in after
+            and effect.shows_with_time and not effect.everyday]
+    return _AS_GOOD if len(laws) > 1 else _LESS
 
 
 def _without_the_like(engine, best, cls):
     """Effects of a fit without those that a course stands for, too: of its stage, and with an
     offset's, which adds what is slow, those that do so otherwise."""
     slow = not np.ptp(cls.column(np.arange(2.0)))
+
+    def is_alike(cause, effect):
+        if effect.stage == cls.stage:
+            return effect.shows_with_time
+        return slow and (effect.acts_on_slow_motion
+                         or effect.shows_with_time and _is_slow(engine, best, cause, cls))
     return {cause: effect for cause, effect in best.effects.items()
-            if cause in engine.search.base or not effect.shows_with_time | effect.acts_on_slow_motion
-            or not (effect.stage == cls.stage
-                    or slow and (effect.acts_on_slow_motion or _is_slow(engine, best, cause, cls)))}
+            if cause in engine.search.base or not is_alike(cause, effect)}
 
 
 def _is_slow(engine, best, cause, cls):
@@ -80,7 +116,7 @@ def _is_slow(engine, best, cause, cls):
         {c: e for c, e in best.effects.items() if c != cause}))[p.used]
     place = p.time[p.used] / p.time[-1]
     added = added - added.mean()
-    basis, _ = np.linalg.qr(_cosines(place, cls.half_waves[-1]))
+    basis, _ = np.linalg.qr(_columns(place, range(cls.half_waves[-1] + 1)))
     taken = basis.T @ added
     return taken @ taken > _SLOW * (added @ added)
 
@@ -92,7 +128,7 @@ def _left(p, column, target, half_waves):
     courses = Modulated(lambda start, stop: column[start:stop, None], target, p.used, blocks)
 
     def power(waves):
-        error = (target - courses.predict(range(waves + 1))) * p.used
+        error = (target - courses.predict(range(waves + 1), _columns)) * p.used
         return float(error @ error)
     constant = power(0)
     least, chosen = constant, 0
@@ -103,17 +139,44 @@ def _left(p, column, target, half_waves):
     return least / max(constant, 1e-300), chosen, least
 
 
-def _cosines(place, waves):
-    """Columns of a course, shape (n, waves + 1), at places from 0 to 1 along the record."""
-    return np.cos(np.pi * np.outer(place, np.arange(waves + 1)))
+def _columns(place, orders):
+    """Columns of a course, shape (n, m), at places from 0 to 1 along the record: cosines of some
+    orders, and what has a slope at its ends, too, which these have not."""
+    columns = cosines(place, orders)
+    return columns if len(orders) == 1 else np.c_[columns, place, place**2]
 
 
-def _curve(p, column, target, waves, time):
-    """The course that describes a target best, at certain times [s] since its start."""
-    rows, length = p.used, p.time[-1]
-    weights = np.linalg.lstsq(_cosines(p.time[rows] / length, waves) * column[rows, None],
-                              target[rows], rcond=None)[0]
-    return _cosines(time / length, waves) @ weights
+def refined(engine, effects):
+    """The courses of an engine, found once more beside its fit of some effects."""
+    p, result = engine.problem, {}
+    fit = engine.search.fit({**effects, **engine.search.base})
+    for cause, effect in engine.search.courses.items():
+        cls = type(effect)
+        kept = {name: other for name, other in fit.effects.items() if name != cause}
+        target, before = _to_be_described(p, kept, cls)
+        _, waves, _ = _left(p, cls.column(before), target, cls.half_waves)
+        result[cause] = _through(p, cls, before, target, waves)
+    return result
+
+
+def _to_be_described(p, kept, cls):
+    """What a simulation with some effects leaves to a course, and its output where that acts."""
+    return ((p.measured - p.simulate(kept)) * p.used,
+            p.simulate({c: e for c, e in kept.items() if e.stage < cls.stage}))
+
+
+def _through(p, cls, before, target, waves):
+    """Effect with the course of so many half waves that describes a target best."""
+    rows, orders, length = p.used, range(waves + 1), p.time[-1]
+    columns = _columns(p.time[rows] / length, orders) * cls.column(before)[rows, None]
+    weights = np.linalg.lstsq(columns, target[rows], rcond=None)[0]
+    place = np.linspace(0.0, 1.0, KNOTS)
+    return cls.in_course(p.record.since_start_s + length * place, _columns(place, orders) @ weights)
+
+
+def _values(effect):
+    """Values of a course at its instants."""
+    return np.array(effect.course) + effect.rate_per_s * np.array(effect.course_at_s)
 
 
 def _measures(motion, used):
@@ -137,11 +200,10 @@ def _follows(course, measures):
     return any((course @ each)**2 > _ALIKE * (course @ course) * (each @ each) for each in moving)
 
 
-def is_worth_it(before, after):
-    """Whether a fit beside a course leaves far less, or as much without what a course stands for."""
-    fewer = any(effect.shows_with_time and not effect.everyday and cause not in after.effects
-                for cause, effect in before.effects.items())
-    return after.cost < (_AS_GOOD if fewer else _LESS) * before.cost
+def is_worth_it(before, after, courses):
+    """Whether a fit beside courses leaves far less, or as much without several laws in time."""
+    laws = after.effects.keys() - courses.keys()
+    return after.cost < _allowed(before.effects, laws) * before.cost
 
 
 def findings(engine, fitted, stds):
@@ -159,7 +221,7 @@ def findings(engine, fitted, stds):
             doubtful[cause] = f"{shares[part]:.0%} of what is left changes with time: the course " \
                               "in time is another one"
         elif g.is_relevant:
-            values = np.array(effect.course) + effect.rate_per_s * np.array(effect.course_at_s)
+            values = _values(effect)
             named.append(Finding(effect, stds.get(cause, {}), certainty(g), [], [
                 f"a course from {values.min():.3g} to {values.max():.3g} along the record, judged "
                 "in blocks that it was not fitted to", *gain_words(cause, g, np.inf, [])], g))

@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 
 from ..errors import ModelError
-from ..model.parameters import parameter_fields
+from ..model.parameters import is_needed_list, parameter_fields
 from . import behaviour, declaration
 from .draws import Broken, Draws
 
@@ -58,7 +58,7 @@ def check_effect(cls, seed=0):
     >>> frac_accel.check_effect(effect_of("offset"))
     """
     for number, (name, check) in enumerate(CHECKS.items()):
-        if name not in DECLARED and (_has_lists(cls) or getattr(cls, "of_reference", False)):
+        if name not in DECLARED and (_needs_lists(cls) or getattr(cls, "of_reference", False)):
             continue
         try:
             with np.errstate(all="ignore"):
@@ -70,9 +70,8 @@ def check_effect(cls, seed=0):
             raise ModelError(f"{_who(cls)}: {name}: {type(error).__name__}: {line}") from error
 
 
-def _has_lists(cls):
-    return dataclasses.is_dataclass(cls) and any(
-        field.metadata.get("list") for field in parameter_fields(cls))
+def _needs_lists(cls):
+    return dataclasses.is_dataclass(cls) and any(map(is_needed_list, parameter_fields(cls)))
 
 
 def _who(cls):

@@ -13,7 +13,15 @@ from ..model import AXES, SensorModel
 from ..model.effects import effect_names, effect_of
 from ..model.effects.base import REFERENCE, STAMPS, Effect
 from ..model.effects.fit_starts import Start
-from ..model.parameters import Scales, as_mapping, build, is_varied, parameter_fields, plain
+from ..model.parameters import (
+    Scales,
+    as_mapping,
+    build,
+    is_needed_list,
+    is_varied,
+    parameter_fields,
+    plain,
+)
 from .draws import CORE, RATE, Broken, core_for, sensor_with, span, words
 
 _TABLE = Path(__file__).parents[2] / "docs" / "effects.md"
@@ -107,18 +115,14 @@ def documents(cls, draws):
         raise Broken("the class has no docstring")
     # what is no cause by itself is described below the table
     if cls.__module__.startswith("frac_accel.model.effects.") and _TABLE.exists() \
-            and all(map(_is_number, parameter_fields(cls))) \
+            and not any(map(is_needed_list, parameter_fields(cls))) \
             and row(cls) not in _TABLE.read_text(encoding="utf-8").splitlines():
         raise Broken(f"docs/effects.md lacks its row: {row(cls)}")
 
 
-def _is_number(field):
-    return not field.metadata.get("list")
-
-
 def survives_yaml(cls, draws):
     """Parameters are the same after they were written to a model file and read."""
-    if not all(map(_is_number, parameter_fields(cls))):
+    if any(map(is_needed_list, parameter_fields(cls))):
         return  # nobody can draw its coefficients
     registered = cls.cause in effect_names()
     if registered and effect_of(cls.cause) is not cls:

@@ -46,7 +46,7 @@ class Draws:
     def _accepted(self, cls, value):
         for _ in range(_TRIES):
             drawn = {field.name: float(value(field)) if is_varied(field) else self._fixed(field)
-                     for field in parameter_fields(cls)}
+                     for field in parameter_fields(cls) if not field.metadata.get("list")}
             try:
                 return build(cls, drawn, cls.cause)
             except ModelError as error:

@@ -108,6 +108,11 @@ def is_varied(field):
     return not any(field.metadata.get(key) for key in ("list", "choices", "whole", "fixed"))
 
 
+def is_needed_list(field):
+    """Whether a parameter is a list that must be given, which nobody can draw."""
+    return bool(field.metadata.get("list")) and field.default is dataclasses.MISSING
+
+
 def fixed_values(instance):
     """Values by name of what no fit varies: counts and words."""
     return {field.name: getattr(instance, field.name) for field in parameter_fields(type(instance))
@@ -176,10 +181,11 @@ def build(cls, mapping, where):
 
 
 def as_mapping(instance):
-    """Inverse of `build`: plain numbers and lists."""
+    """Inverse of `build`: plain numbers and lists, without such as are not needed and empty."""
     return {field.name: list(value) if isinstance(value, tuple) else value
             for field in parameter_fields(type(instance))
-            for value in [getattr(instance, field.name)]}
+            for value in [getattr(instance, field.name)]
+            if not (isinstance(value, tuple) and not value) or is_needed_list(field)}
 
 
 def expectation(field):

@@ -27,8 +27,8 @@ def along(time_s, at_s, values):
 def require_course(cause, at_s, values):
     """Raise ModelError where a course has not one value for each of some ascending instants."""
     if len(at_s) != len(values) or len(at_s) == 1 or not np.all(np.diff(at_s) > 0):
-        raise ModelError(f"{cause}.course_at_s: {len(at_s)} instants and {len(values)} values given, "
-                         "expected as many of each, at least 2, and ascending instants; or none")
+        raise ModelError(f"{cause}.course_at_s: {len(at_s)} instants and {len(values)} values "
+                         "given, expected as many of each, at least 2 and ascending; or none")
 
 
 def about_line(time_s, values):

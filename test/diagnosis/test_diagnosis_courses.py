@@ -1,0 +1,101 @@
+"""A gain or a zero that drifts along a course that follows no law: what a simulated road knows."""
+
+import numpy as np
+import pytest
+from sampled_pair import sampled_pair
+from scipy.signal import butter, sosfilt, sosfiltfilt
+
+from frac_accel import SensorModel, diagnose, validate
+from frac_accel.model.core import Gain
+
+RATE, FINER, DURATION_S = 100.0, 4, 240.0
+
+
+def course(rng, periods):
+    """A course of few waves of any phase, without a mean, of unit standard deviation."""
+    sizes, turns = rng.normal(size=3), rng.uniform(0, 2 * np.pi, 3)
+    waves = rng.uniform(0.3, periods, 3)
+    place = np.linspace(0, 1, round(RATE * FINER * DURATION_S))
+    values = sum(size * np.sin(2 * np.pi * wave * place + turn)
+                 for size, wave, turn in zip(sizes, waves, turns)) + rng.normal() * place
+    return (values - values.mean()) / values.std()
+
+
+def pair(seed, sensor, motion_hz=(0.3, 20.0)):
+    """Reference and sensor, as (motion, fine time, fine rate) makes it, with noise of 0.5 %."""
+    rng = np.random.default_rng(seed)
+    fine = FINER * RATE
+    motion = sosfiltfilt(butter(2, motion_hz, "band", fs=fine, output="sos"),
+                         rng.normal(size=round(fine * DURATION_S)))
+    motion /= motion.std()
+    return sampled_pair(rng, (motion, sensor(rng, motion, fine)), FINER, RATE, 0.005)
+
+
+def drifting_zero(rng, motion, rate):
+    return 1.02 * motion + rng.uniform(0.05, 0.5) * course(rng, 3)
+
+
+def drifting_gain(rng, motion, rate):
+    return motion * (1 + rng.uniform(0.03, 0.15) * course(rng, 2)) + 0.05
+
+
+@pytest.mark.parametrize(("sensor", "cause"), [(drifting_zero, "offset_drift"),
+                                               (drifting_gain, "gain_drift")])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_course_is_found_and_what_is_written_does_what_is_claimed(sensor, cause, seed, tmp_path):
+    record = pair(seed, sensor)
+    found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
+    assert found.verdict == "explained"
+    assert cause in [finding.cause for finding in found.findings]
+    assert {finding.cause for finding in found.findings} <= {cause, "offset", "sensitivity_error"}
+    assert found.extended["nrmse"] < 0.01
+    found.model.save(tmp_path / "model.yaml")
+    validated = validate(record, SensorModel.load(tmp_path / "model.yaml"))
+    assert validated.simulation.total.nrmse == pytest.approx(found.extended["nrmse"], rel=0.2)
+
+
+def lagging(rng, motion, rate):
+    frequency = np.fft.rfftfreq(len(motion), 1 / rate)
+    low = np.fft.irfft(np.fft.rfft(motion) / (1 + 1j * frequency / 12.0), len(motion))
+    return low + 0.8 * course(rng, 3)
+
+
+def test_all_else_is_found_beside_a_zero_that_drifts():
+    found = diagnose(pair(7, lagging), SensorModel(Gain(1.0)), time_limit_s=60)
+    effects = {finding.cause: finding for finding in found.findings}
+    assert effects.keys() == {"offset_drift", "low_pass_lag"}
+    lag = effects["low_pass_lag"]
+    assert abs(lag.effect.corner_hz - 12.0) < 4 * lag.std["corner_hz"] + 0.02
+    assert found.extended["nrmse"] < 0.01
+
+
+def slow_high_pass(rng, motion, rate):
+    """Of second order, which no cause says."""
+    return sosfilt(butter(2, 0.02, "high", fs=rate, output="sos"), motion)
+
+
+def wandering_delay(rng, motion, rate):
+    time = np.arange(len(motion)) / rate
+    return np.interp(time - 0.004 * course(rng, 2), time, motion)
+
+
+@pytest.mark.parametrize(("sensor", "motion_hz"), [
+    (slow_high_pass, (0.004, 20.0)), (wandering_delay, (0.3, 20.0))])
+@pytest.mark.parametrize("seed", range(2))
+def test_what_only_looks_like_a_course_has_no_such_name(sensor, motion_hz, seed):
+    found = diagnose(pair(seed, sensor, motion_hz), SensorModel(Gain(1.0)), time_limit_s=60)
+    assert not {finding.cause for finding in found.findings} & {"offset_drift", "gain_drift"}
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_zero_that_follows_the_vibration_does_not_drift(seed):
+    rng = np.random.default_rng(seed)
+    fine = FINER * RATE
+    level = 1 + 0.5 * course(rng, 2)
+    motion = level * sosfiltfilt(butter(2, (0.5, 20.0), "band", fs=fine, output="sos"),
+                                 rng.normal(size=len(level)))
+    motion /= motion.std()
+    output = motion + 0.1 * sosfilt(butter(1, 0.05, fs=fine, output="sos"), motion**2)
+    record = sampled_pair(rng, (motion, output), FINER, RATE, 0.005)
+    found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
+    assert "offset_drift" not in {finding.cause for finding in found.findings}
