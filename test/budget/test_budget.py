@@ -252,6 +252,18 @@ def test_noise_at_rest():
     assert known.by == "rest" and known.rms == pytest.approx(0.02, rel=0.15)
 
 
+@pytest.mark.parametrize("frequency_hz", [7.0, 23.0])
+def test_a_motor_that_runs_at_rest_is_no_noise(frequency_hz):
+    """Its speed wanders, so that it is no line either."""
+    e, measured, reference = rest_record()
+    turns = np.cumsum(frequency_hz * (1 + 0.02 * np.interp(
+        np.arange(len(e)), np.arange(0, len(e), 200), np.random.default_rng(1).normal(
+            size=len(range(0, len(e), 200)))))) / 100.0
+    motor = 0.3 * np.sin(2 * np.pi * turns)
+    known = established_noise(e + motor, measured + motor, reference, np.ones(len(e), bool), 100.0)
+    assert known.by != "rest" and any("narrow band around" in words for words in known.words)
+
+
 @pytest.mark.parametrize("std, used_one", [(0.021, "rest"), (0.1, "rest"), (1e-3, "rest")])
 def test_rest_is_believed_before_the_covariance(std, used_one):
     e, measured, reference = rest_record()

@@ -25,7 +25,7 @@ def pair(seed, sensor, motion_hz=(0.3, 20.0)):
     """Reference and sensor, as (motion, fine time, fine rate) makes it, with noise of 0.5 %."""
     rng = np.random.default_rng(seed)
     fine = FINER * RATE
-    motion = sosfiltfilt(butter(2, motion_hz, "band", fs=fine, output="sos"),
+    motion = sosfiltfilt(butter(4, motion_hz, "band", fs=fine, output="sos"),
                          rng.normal(size=round(fine * DURATION_S)))
     motion /= motion.std()
     return sampled_pair(rng, (motion, sensor(rng, motion, fine)), FINER, RATE, 0.005)
@@ -92,7 +92,7 @@ def test_a_zero_that_follows_the_vibration_does_not_drift(seed):
     rng = np.random.default_rng(seed)
     fine = FINER * RATE
     level = 1 + 0.5 * course(rng, 2)
-    motion = level * sosfiltfilt(butter(2, (0.5, 20.0), "band", fs=fine, output="sos"),
+    motion = level * sosfiltfilt(butter(4, (0.5, 20.0), "band", fs=fine, output="sos"),
                                  rng.normal(size=len(level)))
     motion /= motion.std()
     output = motion + 0.1 * sosfilt(butter(1, 0.05, fs=fine, output="sos"), motion**2)

@@ -7,6 +7,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from frac_accel import Record, Samples, diagnose
+from frac_accel.record.clock import Clock
 
 FINE = 4000.0
 
@@ -61,3 +62,47 @@ def test_values_at_uniform_instants_stay_as_they_are(seed, share):
 def test_stamps_that_scatter_truly_by_little_are_no_finding_under_gravity():
     topics, _ = pair(21, (400.0, 400.0), 2e-5, true=True)
     assert not diagnose(tuple(topics), axis="z", time_limit_s=60).findings
+
+
+@pytest.mark.parametrize("seed", [31, 32])
+def test_limits_and_lattice_stay_those_of_what_was_published(seed):
+    rng = np.random.default_rng(seed)
+    (reference, sensor), _ = pair(seed, (200.0, 200.0), 0.05 / 200, true=True, gravity=0.0)
+    step, limit = rng.uniform(0.02, 0.1), rng.uniform(1.2, 1.8)
+    most = step * np.floor(limit / step)
+    rounded = np.clip(step * np.round(sensor.values / step), -most, most)
+    record = Record.of(reference, Samples.of(sensor.stamps_ns, rounded), "z")
+    assert record.topics[1].is_moved
+    assert record.step("sensor", 2) == pytest.approx(step, rel=1e-6)
+    found = record.integrity(2)
+    # the values themselves lie on no lattice any more
+    assert found.step is None
+    assert found.upper == pytest.approx(most) and found.lower == pytest.approx(-most)
+    at_limit = np.abs(rounded[:, 2]) > most - step / 2
+    assert np.all(np.abs(record.topics[1].values[at_limit, 2]) == pytest.approx(most))
+    diagnosed = diagnose((reference, Samples.of(sensor.stamps_ns, rounded)), axis="z",
+                         time_limit_s=60)
+    causes = {f.cause: f.effect for f in diagnosed.findings}
+    assert causes["clipping"].upper == pytest.approx(most)
+    assert causes.keys() <= {"clipping", "quantization", "reference_noise"}
+
+
+@pytest.mark.parametrize("seed", [41, 42, 43])
+@pytest.mark.parametrize("share", [0.15, 0.22, 0.27])
+def test_stamps_that_scatter_by_a_quarter_of_the_interval_are_a_clocks(seed, share):
+    rng = np.random.default_rng(seed)
+    rate, count = rng.uniform(50, 2000), 20_000
+    scatter = np.clip(share * rng.normal(size=count), -0.48, 0.48)
+    clock = Clock.of(np.round(1e9 * (np.arange(count) + scatter) / rate).astype(np.int64))
+    assert clock.kind == "regular"
+    # of a line through stamps that scatter by so much
+    assert clock.rate_hz == pytest.approx(rate, rel=5 * share * np.sqrt(12) / count**1.5)
+    assert clock.scatter_s * rate == pytest.approx(np.std(scatter), rel=0.02)
+    assert np.array_equal(np.diff(clock.slot), np.ones(count - 1))
+
+
+def test_a_third_of_the_samples_lost_is_no_clock_that_scatters():
+    rng = np.random.default_rng(5)
+    kept = np.sort(rng.choice(30_000, 20_000, replace=False))
+    clock = Clock.of(np.round(1e7 * (kept + 0.02 * rng.normal(size=20_000))).astype(np.int64))
+    assert clock.rate_hz == pytest.approx(100.0, rel=1e-5)
