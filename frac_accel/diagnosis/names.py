@@ -32,8 +32,9 @@ def undetermined(effect, unknowns, theta, stds, core, duration_s):
     duration_s : float
         Of the record.
     """
-    if effect.degenerate():
-        return effect.degenerate()
+    degenerate = effect.degenerate({unknown.name: unknown.scale for unknown in unknowns})
+    if degenerate:
+        return degenerate
     moved = []
     for unknown, place in zip(unknowns, theta):
         value, std = getattr(effect, unknown.name), stds.get(unknown.name, np.inf)

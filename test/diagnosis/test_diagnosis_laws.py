@@ -84,9 +84,9 @@ def test_a_spring_by_the_fifth_power_has_no_hysteresis(seed):
 
 def test_a_hysteresis_that_only_bends_is_none():
     cls = effect_of("hysteresis")
-    assert cls(0.01, 0.003, -0.1).degenerate()
+    assert cls(0.01, 0.003, -0.1).degenerate({})
     # that of the Bouc-Wen benchmark
-    assert not cls(1.0, 800.0, -1100.0).degenerate()
+    assert not cls(1.0, 800.0, -1100.0).degenerate({})
 
 
 @pytest.mark.parametrize("seed", [3531, 3532])

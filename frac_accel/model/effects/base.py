@@ -291,8 +291,14 @@ class Effect:
         return isinstance(core, Oscillator) or (
             cls.change_core is Effect.change_core and cls.add_force is Effect.add_force)
 
-    def degenerate(self):
-        """Why, with these parameters, it is not what its name says, in words; or None."""
+    def degenerate(self, scales):
+        """Why, with these parameters, it is not what its name says, in words; or None.
+
+        Parameters
+        ----------
+        scales : dict of str to float
+            What counts as a change of one of each fitted parameter, in this record.
+        """
         return None
 
     def beside(self, residual, time_s):

@@ -44,7 +44,7 @@ class FreeMassFriction(Effect):
     def acts_on(cls, core):
         return isinstance(core, Gain)
 
-    def degenerate(self):
+    def degenerate(self, scales):
         return "friction that is so much larger one way is mostly a constant force" \
             if abs(self.asymmetry) > _LOPSIDED else None
 

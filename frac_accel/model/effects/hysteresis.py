@@ -34,7 +34,7 @@ class Hysteresis(Effect):
     def change_core(self, core):
         return require_oscillator(core, self.cause)
 
-    def degenerate(self):
+    def degenerate(self, scales):
         return "it bends without a loop, as a law of the spring without memory does" \
             if self.gamma < -_BENDS * self.beta else None
 

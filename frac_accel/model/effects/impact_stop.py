@@ -16,6 +16,8 @@ _STIFFNESS = 20.0
 # measured ones must be on average, in RMS of the residual.
 _EXTREMES = 16
 _BEHIND = 0.5
+# Tenths of the output's standard deviation within which each swing reaches a stop.
+_SWING = 3.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,6 +53,12 @@ class ImpactStop(Effect):
 
     def add_force(self, force):
         return force.with_law(_stop, self.gap, self.stiffness, self.sides, slope=self.stiffness)
+
+    def degenerate(self, scales):
+        if abs(self.gap) < _SWING * scales["gap"]:
+            return (f"its gap of {self.gap:.3g} lies within every swing: a gain that differs by "
+                    "direction does the same")
+        return None
 
     @classmethod
     def starts(cls, view):
