@@ -19,10 +19,11 @@ THOROUGH = """
     blind_scoring budget command_fleet diagnosis_companions diagnosis_courses diagnosis_high_pass
     diagnosis_laws diagnosis_of_measured diagnosis_one_filter diagnosis_slow_motion
     diagnosis_soft_mount diagnosis_sprung diagnosis_steps diagnosis_strong_spring
-    diagnosis_truthful diagnosis_unbounded diagnosis_unequal_rates domains_agree empirical_link free_mass further_forces fuzz
-    identify_general_equation keeper linear_causes long_records monitoring_watch outputs
-    paper_command paper_study pooling published_shock real_records reference_faults reference_noise
-    report_browser stepped_sine_points uncertain_motion write_errors
+    diagnosis_truthful diagnosis_unbounded diagnosis_unequal_rates domains_agree empirical_link
+    free_mass further_forces fuzz identify_general_equation keeper linear_causes long_records
+    monitoring_watch outputs paper_command paper_study pooling published_shock real_records
+    reference_faults reference_noise report_browser stepped_sine_points uncertain_motion
+    write_errors
 """.split()
 # Files whose tests draw many records or sensors: the first draw of each test counts as the file
 # does, and `make test-draws` runs the others.

@@ -269,9 +269,8 @@ def _with_a_spring(begin, engine, best, seed, engine_of, record):
     if found is None:
         return begin, engine, best, seed
     model, own_seed = found
-    own_begin = engine_of(model, dict.fromkeys(_CORE, np.inf), own_seed)
-    other = _beside(own_begin, engine, np.zeros(len(engine.wanted), bool))
-    other.spikes, other.aside = engine.spikes, engine.aside
+    own_begin, other = _with_courses(engine_of(model, dict.fromkeys(_CORE, np.inf), own_seed),
+                                     engine, engine.search.courses)
     other.search.candidates = beside_spring(engine, best)
     own_best = other.run(own_seed)
     return (own_begin, other, own_best, own_seed) if is_better(best, own_best) \
@@ -308,6 +307,7 @@ def _beside_a_course(begin, engine, courses, effects):
 
 
 def _with_courses(begin, engine, courses):
+    """Engine, otherwise as another one, whose every fit has these courses, and what begins it."""
     begin = functools.partial(begin, base={**begin.keywords["base"], **courses},
                               candidates=beside(courses, begin.keywords["candidates"]))
     other = _beside(begin, engine, np.zeros(len(engine.wanted), bool))

@@ -299,6 +299,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     away, near = _moved(engine, fitted, stds)
     drifts, other_course = courses.findings(engine, fitted, stds)
     suspects += [_suspect({cause}, 0.0, words) for cause, words in (near | other_course).items()]
+    unnamed += sorted(other_course)
     findings = [*findings, *away, *drifts, *shown_by(fitted)]
     if any(f.effect.goes_with_size for f in findings):
         left = dataclasses.replace(left, level_score=0.0)
@@ -338,6 +339,8 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     rest = engine.budget(fitted, at_limit) if output is None else \
         engine.budget_between(p.measured, output, p.record.valid)
     findings = [_beside_unseen_core(f, delay_of_unseen_core(engine, fitted)) for f in findings]
+    if noise.rms is None:
+        found.words.extend(words for words in noise.words if words not in found.words)
     if p.in_own_core:
         model, findings = in_own_core(model, findings, p.in_own_core, AXES[p.axis])
     return Diagnosis(

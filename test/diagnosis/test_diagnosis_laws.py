@@ -89,6 +89,13 @@ def test_a_hysteresis_that_only_bends_is_none():
     assert not cls(1.0, 800.0, -1100.0).degenerate({})
 
 
+def test_a_stop_within_every_swing_is_none():
+    cls = effect_of("impact_stop")
+    # of an output of unit standard deviation
+    assert cls(-2e-5, 3.0, 1.0).degenerate({"gap": 0.1})
+    assert not cls(1.5, 3.0, 1.0).degenerate({"gap": 0.1})
+
+
 @pytest.mark.parametrize("seed", [3531, 3532])
 def test_one_chebyshev_filter_is_not_three_causes(seed):
     rng = np.random.default_rng(seed)
