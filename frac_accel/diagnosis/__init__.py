@@ -161,11 +161,10 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     engine.at_limit, engine.found = at_limit, found
     engine.identified = {cause: effect for cause, effect in (seed or {}).items() if effect.everyday}
     _require_relation(engine, axis, seed)
-    begin, engine = _beside_a_course(begin, engine, begun_with(engine), {})
-    best = engine.run(seed)
+    begin, engine, best = _searched(begin, engine, seed)
     if not is_stated and is_bent(engine, best):
         begin, engine, best, seed = _with_a_spring(begin, engine, best, seed, engine_of, record)
-    begin, engine, best = _with_a_course(begin, engine, best, seed)
+    begin, engine, best = _with_a_course(begin, engine, best, course_of(engine, best), seed)
     if engine.part is None:
         engine, best = _without_start(begin, engine, best, found)
         engine, best = _without_drowned(begin, engine, best, found, seed)
@@ -277,10 +276,24 @@ def _with_a_spring(begin, engine, best, seed, engine_of, record):
         else (begin, engine, best, seed)
 
 
-def _with_a_course(begin, engine, best, seed):
-    """Engine that looks for all else beside what changes slowly, what begins it, and its best set;
-    those given where nothing does."""
-    courses = {} if engine.search.courses else course_of(engine, best)
+def _searched(begin, engine, seed):
+    """Engine, what begins it, and its best set of causes: beside what changes slowly before all
+    else, if that leaves noise or far less than without."""
+    courses = begun_with(engine)
+    if not courses:
+        return begin, engine, engine.run(seed)
+    own_begin, other = _beside_a_course(begin, engine, courses, {})
+    own_best = other.run(seed)
+    if (other.part or other).noise_only(own_best):
+        return own_begin, other, own_best
+    best = engine.run(seed)
+    return (own_begin, other, own_best) if is_worth_it(best, own_best, courses) \
+        else (begin, engine, best)
+
+
+def _with_a_course(begin, engine, best, courses, seed):
+    """Engine that looks for all else beside courses in time, what begins it, and its best set;
+    those given where nothing changes slowly."""
     if not courses or engine.problem.limit.ends_search(
             "nothing was looked for beside what changes slowly"):
         return begin, engine, best
@@ -293,9 +306,7 @@ def _with_a_course(begin, engine, best, seed):
 
 def _beside_a_course(begin, engine, courses, effects):
     """Engine whose every fit has these courses, found once more beside the fit of some effects (or
-    of the common ones and a filter), and what begins it; those given without any."""
-    if not courses:
-        return begin, engine
+    of the common ones and a filter), and what begins it."""
     _, first = _with_courses(begin, engine, courses)
     effects = {cause: effect for cause, effect in effects.items()
                if cause in first.search.candidates}

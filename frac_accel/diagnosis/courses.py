@@ -58,7 +58,7 @@ def course_of(engine, best):
         Of the engine, or of its part.
     """
     p = engine.problem
-    if len(p.time) != len(p.record) or len(p.time) < 8 * KNOTS:
+    if engine.search.courses or len(p.time) != len(p.record) or len(p.time) < 8 * KNOTS:
         return {}
     found, own_power = [], p.cost(best.effects)
     for cause, cls in known_effects().items():
