@@ -192,6 +192,11 @@ class Record:
         return tuple(Topic(Samples.of(stamps, values[self.valid]), name, fewest=3) for name, values
                      in (("reference", self.reference), ("sensor", self.sensor)))
 
+    def is_on_other_instants(self, name):
+        """Whether the values of "reference" or "sensor" are those of other instants than the
+        published ones, so that they lie on no lattice."""
+        return name in self.resampled or self._topics[name == "sensor"].is_moved
+
     def step(self, name, column):
         """Lattice step of an axis of "reference" or "sensor" as published, or None."""
         return self._topics[name == "sensor"].step(column)

@@ -10,8 +10,9 @@ from ..correction.design import NYQUIST_SHARE, plateau, require_wishes
 from ..errors import FracAccelError
 from ..identification.response.excitation import excited_band
 from ..io.samples import Samples
-from ..model import AXES, SensorModel
+from ..model import AXES, AxisModel, SensorModel
 from ..model.effects.axis_mixing import turn_back
+from ..model.effects.base import QUANTIZATION
 from ..record import Record
 from ..record.resampling import within
 from ..record.sources import pair_of
@@ -357,6 +358,9 @@ def _simulated(model, pair, column, temperature_at, back):
         temperature = temperature_at(pair.start_ns + 1e9 * seconds)
     at = np.arange(len(pair)) / pair.sampling_rate_hz
     instants = np.round(1e9 * at).astype(np.int64)
+    if pair.is_on_other_instants("sensor"):
+        # these values lie on no lattice, and would only be rounded once more
+        model = _without_stage(model, QUANTIZATION)
     inside, edge = pair.valid.copy(), min(EDGE, len(pair) // 16)
     inside[:edge] = inside[len(pair) - edge:] = False
     own = model.axis(AXES[column])
@@ -373,6 +377,13 @@ def _simulated(model, pair, column, temperature_at, back):
     # how it moved before the record is not known: a free mass does not move on by itself
     return min((begun(initial) for initial in ("steady", "rest")),
                key=lambda both: np.mean(np.square(both[0] - both[1])))
+
+
+def _without_stage(model, stage):
+    """A model without its effects at one stage."""
+    axes = {name: AxisModel(own.core, tuple(e for e in own.effects if e.stage != stage))
+            for name in AXES for own in [model.axis(name)]}
+    return SensorModel(model.core, (), axes, model.metadata, model.reference_faults)
 
 
 def _begun_before(own, error, rate):
