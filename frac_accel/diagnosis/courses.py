@@ -29,8 +29,9 @@ _SAME_KIND = 0.3
 
 
 def begun_with(engine):
-    """As `course_of`, beside the common causes alone, where no other cause promises half as much:
-    what is so large would hide all else, and make the search for it long."""
+    """As `course_of`, beside the common causes alone, where no other cause promises half as much,
+    and no law in time does: what is so large would hide all else, and make the search for it long.
+    """
     p = engine.problem
     if len(p.time) > _SHORT or p.limit.ends_search():
         return {}
@@ -41,7 +42,18 @@ def begun_with(engine):
     promised = min((cost for cost, *_ in engine.search.screen(bare)), default=np.inf)
     (cause, effect), = found.items()
     kept = _without_the_like(engine, bare, type(effect))
-    return found if _CLEARLY * p.cost({**kept, cause: effect}) < promised else {}
+    enough = _CLEARLY * p.cost({**kept, cause: effect})
+    return found if enough < min(promised, _least_of_a_law(engine, effect)) else {}
+
+
+def _least_of_a_law(engine, effect):
+    """Least cost of a law in time of a course's kind, beside all common causes."""
+    search = engine.search
+    common = search.fit({**search.base, **search.everyday(search.baseline)})
+    of_kind = set(search.candidates) - set(beside({effect.cause: effect}, search.candidates))
+    fits = search.fit_all([search.begun(common, cause, begin) for _, cause, begin in
+                           search.screen(common) if cause in of_kind])
+    return min((fit.cost for fit in fits), default=np.inf)
 
 
 def course_of(engine, best):

@@ -42,6 +42,8 @@ _ALIKE, _TELLS_LAW = 0.8, 5.0
 # adds (RMS) from which it is slow. Then it must take so many times what is left wanders by: the
 # best step in noise with a long memory takes three to four times that.
 _SLOW_PARTS, _SLOW_SHARE, _SLOW_TIMES = 20, 0.5, 6.0
+# Scatter of what a constant adds, over it: a dead zone, or samples that do not count, make some.
+_CONSTANT = 0.1
 # Share of what a cause takes (RMS) that it must change the output by: else its free motion does
 # that.
 _BY_ITSELF = 0.5
@@ -134,7 +136,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
         # what begins or settles does so from a constant, which may be that of its start or its end
         of_used = [added[cause][p.used] for cause in pair]
         if any(best.effects[cause].counts_from_start for cause in pair) \
-                and any(np.allclose(values, values[0]) for values in of_used):
+                and any(np.std(values) < _CONSTANT * abs(np.mean(values)) for values in of_used):
             continue
         for cause, other in (pair, pair[::-1]):
             doubts.setdefault(cause, f"it nearly cancels {other}: together they may stand for "

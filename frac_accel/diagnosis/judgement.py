@@ -310,7 +310,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     # hint of structure in what is left is no reason to call the record unexplained
     hint = max(engine.left(fitted).share, sum(share for share, _ in strange))
     unrelated = [part for _, part in strange if part not in _OF_MOTION]
-    plain = not findings and not unrelated and (hint == 0 or account.accounted and (
+    plain = all(f.effect.read_off for f in findings) and not unrelated and (hint == 0 or account.accounted and (
         hint < _HINT or hint < _MUCH and np.sqrt(hint) * account.share < _UNSEEN))
     verdict = verdict_of(
         findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
