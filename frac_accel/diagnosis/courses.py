@@ -23,7 +23,11 @@ _LESS, _AS_GOOD = 0.6, 1.05
 # Share of what a cause adds (power) that a course must describe for it to be one.
 _SLOW = 0.8
 # Square of a course's correlation with the motion's own from which it may be that.
-_ALIKE = 0.6
+_ALIKE = 0.92
+# Share of what the record knows of a course, everywhere, with which it is held at none.
+_HELD = 1e-4
+# Shares of a heat or a charge that stay from one instant of a course to the next.
+_KEEPS = (0.5, 0.75, 0.9)
 # Share of what is left that may still change with time, in the part of the budget that is its own.
 _SAME_KIND = 0.3
 
@@ -86,7 +90,8 @@ def course_of(engine, best):
                 or power > _allowed(best.effects, kept) * own_power:
             continue
         effect = _through(p, cls, before, target, waves)
-        if not _follows(_values(effect), _measures(before, p.used)):
+        if not _follows(_values(effect), _mean(cls.column(before)**2, p.used),
+                        _measures(before, p.used, _adds(cls))):
             found.append((left, cause, effect))
     return {cause: effect for _, cause, effect in sorted(found, key=lambda each: each[:2])[:1]}
 
@@ -107,10 +112,15 @@ def _allowed(before, after):
     return _AS_GOOD if len(laws) > 1 else _LESS
 
 
+def _adds(cls):
+    """Whether a course is added to the output, whatever that is."""
+    return not np.ptp(cls.column(np.arange(2.0)))
+
+
 def _without_the_like(engine, best, cls):
     """Effects of a fit without those that a course stands for, too: of its stage, and with an
     offset's, which adds what is slow, those that do so otherwise."""
-    slow = not np.ptp(cls.column(np.arange(2.0)))
+    slow = _adds(cls)
 
     def is_alike(cause, effect):
         if effect.stage == cls.stage:
@@ -181,9 +191,13 @@ def _through(p, cls, before, target, waves):
     """Effect with the course of so many half waves that describes a target best."""
     rows, orders, length = p.used, range(waves + 1), p.time[-1]
     columns = _columns(p.time[rows] / length, orders) * cls.column(before)[rows, None]
-    weights = np.linalg.lstsq(columns, target[rows], rcond=None)[0]
     place = np.linspace(0.0, 1.0, KNOTS)
-    return cls.in_course(p.record.since_start_s + length * place, _columns(place, orders) @ weights)
+    at_knots = _columns(place, orders)
+    # without motion nothing says what the gain is: it stays near what it is
+    little = np.sqrt(_HELD * np.mean(np.square(cls.column(before)[rows])) * rows.sum() / KNOTS)
+    weights = np.linalg.lstsq(np.r_[columns, little * at_knots],
+                              np.r_[target[rows], np.zeros(KNOTS)], rcond=None)[0]
+    return cls.in_course(p.record.since_start_s + length * place, at_knots @ weights)
 
 
 def _values(effect):
@@ -191,25 +205,37 @@ def _values(effect):
     return np.array(effect.course) + effect.rate_per_s * np.array(effect.course_at_s)
 
 
-def _measures(motion, used):
-    """What of the motion is slow, too: itself, how it changes and adds up, its level and power;
-    each of shape (KNOTS,)."""
-    edges = np.linspace(0, len(motion), KNOTS + 1).astype(int)[:-1]
+def _measures(motion, used, adds):
+    """What of the motion is slow, too: its level and power, what that warms or charges, and, where
+    a course `adds` to it, itself, how it changes and adds up; each of shape (KNOTS,)."""
+    slow = _mean(motion, used)
+    power = _mean((motion - motion[used].mean())**2, used)
+    warmed = []
+    for keeps in _KEEPS:
+        total, course = 0.0, []
+        for added in power:
+            total = keeps * total + (1 - keeps) * added
+            course.append(total)
+        warmed.append(np.array(course))
+    own = [slow, np.gradient(slow), np.cumsum(slow - slow.mean())] if adds else []
+    return [*own, np.sqrt(power), power, *warmed]
+
+
+def _mean(values, used):
+    """Means of samples that count around a course's instants, shape (KNOTS,)."""
+    edges = np.linspace(0, len(values), KNOTS + 1).astype(int)[:-1]
     count = np.maximum(np.add.reduceat(used.astype(float), edges), 1.0)
-
-    def mean(values):
-        return np.add.reduceat(values * used, edges) / count
-    slow = mean(motion)
-    power = mean((motion - motion[used].mean())**2)
-    return [slow, np.gradient(slow), np.cumsum(slow - slow.mean()), np.sqrt(power), power]
+    return np.add.reduceat(values * used, edges) / count
 
 
-def _follows(course, measures):
+def _follows(course, weight, measures):
     """Whether a course may be the motion's own: what is lost of slow motion, or comes with its
-    level."""
-    course = course - course.mean()
-    moving = [each - each.mean() for each in measures if np.ptp(each)]
-    return any((course @ each)**2 > _ALIKE * (course @ course) * (each @ each) for each in moving)
+    level. It counts by the weight that it is known with."""
+    def moving(values):
+        return np.sqrt(weight) * (values - np.average(values, weights=weight))
+    course = moving(course)
+    return any((course @ each)**2 > _ALIKE * (course @ course) * (each @ each)
+               for each in map(moving, measures) if each.any())
 
 
 def is_worth_it(before, after, courses):
@@ -228,7 +254,7 @@ def findings(engine, fitted, stds):
         without = p.simulate({c: e for c, e in fitted.effects.items() if c != cause})
         error = (p.measured - fitted.output)[rows]
         g = gain(error + (fitted.simulated - without)[rows], error)
-        part = "slow" if np.ptp(effect.column(p.measured)) == 0 else "time_varying"
+        part = "slow" if _adds(type(effect)) else "time_varying"
         if shares.get(part, 0.0) > _SAME_KIND:
             doubtful[cause] = f"{shares[part]:.0%} of what is left changes with time: the course " \
                               "in time is another one"

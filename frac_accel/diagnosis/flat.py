@@ -161,12 +161,21 @@ def _as_open(finding, other, beside):
 
 
 def _with_a_link(engine, fitted):
-    """Fits with one link more, the best first."""
+    """Fits with one link more, the best first; of those that say the same, the smallest."""
     search = engine.search
     fits = search.with_a_filter(fitted, _FITTED, fitted.cost)
     # one of another order may be the best, and none needs what the oscillator was identified with
-    return sorted((search.prune(search.varied(fit), engine.threshold) for fit in fits),
-                  key=lambda fit: fit.cost)
+    pruned = [search.prune(search.varied(fit), engine.threshold) for fit in fits]
+    least = min((fit.cost for fit in pruned), default=0.0)
+    alike = (1 + _AS_WELL / engine.problem.count) * least
+    return sorted(pruned, key=lambda fit: (_is_degenerate(fit), fit.cost > alike,
+                                           fit.size * (fit.cost <= alike), fit.cost))
+
+
+def _is_degenerate(fit):
+    """Whether an effect of a fit is not what its name says."""
+    scales = {unknown.name: unknown.scale for unknown in fit.unknowns}
+    return any(effect.degenerate(scales) for effect in fit.effects.values())
 
 
 def _with_clock(engine, fitted, clocks):

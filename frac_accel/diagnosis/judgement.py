@@ -310,8 +310,9 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     # hint of structure in what is left is no reason to call the record unexplained
     hint = max(engine.left(fitted).share, sum(share for share, _ in strange))
     unrelated = [part for _, part in strange if part not in _OF_MOTION]
-    plain = all(f.effect.read_off for f in findings) and not unrelated and (hint == 0 or account.accounted and (
-        hint < _HINT or hint < _MUCH and np.sqrt(hint) * account.share < _UNSEEN))
+    small = hint < _HINT or hint < _MUCH and np.sqrt(hint) * account.share < _UNSEEN
+    plain = all(f.effect.read_off for f in findings) and not unrelated and (
+        hint == 0 or account.accounted and small)
     verdict = verdict_of(
         findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
         fraction, account.accounted, (strange and not plain) or account.faulty)

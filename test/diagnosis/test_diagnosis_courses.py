@@ -51,7 +51,7 @@ def test_a_course_is_found_and_what_is_written_does_what_is_claimed(sensor, caus
     assert found.extended["nrmse"] < 0.01
     found.model.save(tmp_path / "model.yaml")
     validated = validate(record, SensorModel.load(tmp_path / "model.yaml"))
-    assert validated.simulation.total.nrmse == pytest.approx(found.extended["nrmse"], rel=0.2)
+    assert validated.whole_nrmse == pytest.approx(found.extended["nrmse"], rel=0.2)
 
 
 def lagging(rng, motion, rate):
