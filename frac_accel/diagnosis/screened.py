@@ -156,6 +156,10 @@ def _moved(problem, effect):
     present = next((own for own in axis.effects if own.cause == effect.cause), None)
     moved = []
     for field in parameter_fields(type(effect)):
+        if field.metadata.get("list"):
+            if getattr(effect, field.name):
+                return "", "1", 1.0
+            continue
         null = getattr(axis.core, field.name, None) if field.metadata["null"] == "core" \
             else field.metadata["null"]
         null = getattr(present, field.name) if present is not None else null

@@ -176,7 +176,7 @@ def _parameters(part, entity, old, stds):
     """Rows of the table of one core or effect; lists of coefficients are left out."""
     rows = []
     for field in parameter_fields(type(entity)):
-        if "unit" not in field.metadata:
+        if field.metadata.get("list"):
             continue
         value = getattr(entity, field.name)
         shown, std = rounded(value, stds.get((part, field.name), 0.0))

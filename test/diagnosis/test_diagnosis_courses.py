@@ -7,6 +7,7 @@ from scipy.signal import butter, sosfilt, sosfiltfilt
 
 from frac_accel import SensorModel, diagnose, validate
 from frac_accel.model.core import Gain
+from frac_accel.report.diagnosis import diagnosis_page
 
 RATE, FINER, DURATION_S = 100.0, 4, 240.0
 
@@ -51,6 +52,7 @@ def test_a_course_is_found_and_what_is_written_does_what_is_claimed(sensor, caus
     assert found.extended["nrmse"] < 0.01
     found.model.save(tmp_path / "model.yaml")
     validated = validate(record, SensorModel.load(tmp_path / "model.yaml"))
+    assert cause in diagnosis_page(found).html()
     assert validated.whole_nrmse == pytest.approx(found.extended["nrmse"], rel=0.2)
 
 
