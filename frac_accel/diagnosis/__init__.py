@@ -164,7 +164,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     begin, engine, best = _searched(begin, engine, seed)
     if not is_stated and is_bent(engine, best):
         begin, engine, best, seed = _with_a_spring(begin, engine, best, seed, engine_of, record)
-    begin, engine, best = _with_a_course(begin, engine, best, course_of(engine, best), seed)
+    begin, engine, best = _with_a_course(begin, engine, best, seed)
     if engine.part is None:
         engine, best = _without_start(begin, engine, best, found)
         engine, best = _without_drowned(begin, engine, best, found, seed)
@@ -291,9 +291,10 @@ def _searched(begin, engine, seed):
         else (begin, engine, best)
 
 
-def _with_a_course(begin, engine, best, courses, seed):
+def _with_a_course(begin, engine, best, seed):
     """Engine that looks for all else beside courses in time, what begins it, and its best set;
     those given where nothing changes slowly."""
+    courses = course_of(engine, best)
     if not courses or engine.problem.limit.ends_search(
             "nothing was looked for beside what changes slowly"):
         return begin, engine, best
@@ -322,7 +323,7 @@ def _with_courses(begin, engine, courses):
     begin = functools.partial(begin, base={**begin.keywords["base"], **courses},
                               candidates=beside(courses, begin.keywords["candidates"]))
     other = _beside(begin, engine, np.zeros(len(engine.wanted), bool))
-    other.spikes, other.aside, other.search.courses = engine.spikes, engine.aside, courses
+    other.search.courses = courses
     return begin, other
 
 
@@ -351,7 +352,6 @@ def _without_start(begin, engine, best, found):
                        "the mass moved before is not known, and with the forces that are found it "
                        "is not forgotten sooner")
     other = _beside(begin, engine, early)
-    other.spikes, other.aside = engine.spikes, engine.aside
     return other, other.run({cause: effect for cause, effect in best.effects.items()
                              if cause not in engine.search.base})
 
@@ -360,6 +360,7 @@ def _beside(begin, engine, hidden):
     """The same engine without some samples that count."""
     other = begin(used=engine.wanted & ~hidden)
     other.at_limit, other.identified, other.found = engine.at_limit, engine.identified, engine.found
+    other.spikes, other.aside = engine.spikes, engine.aside
     other.search.courses = engine.search.courses
     return other
 

@@ -1,6 +1,7 @@
 """What changes slowly along a record, along a course that follows no law."""
 
 import numpy as np
+from scipy.signal import lfilter
 
 from ..budget.blocks import Blocks
 from ..budget.modulated import Modulated, cosines
@@ -83,11 +84,12 @@ def course_of(engine, best):
         kept = _without_the_like(engine, best, cls)
         target, before = _to_be_described(p, kept, cls)
         left, waves, power = _left(p, cls.column(before), target, cls.half_waves)
+        if left > 1 - _TAKES or power > _allowed(best.effects, kept) * own_power:
+            continue
         others = [_left(p, column, target, cls.half_waves)[0] for column in
                   (np.ones(len(before)), before, np.gradient(before))
                   if not np.array_equal(column, cls.column(before))]
-        if left > 1 - _TAKES or min(others) < _CLEARLY * left \
-                or power > _allowed(best.effects, kept) * own_power:
+        if min(others) < _CLEARLY * left:
             continue
         effect = _through(p, cls, before, target, waves)
         if not _follows(_values(effect), _mean(cls.column(before)**2, p.used),
@@ -210,13 +212,7 @@ def _measures(motion, used, adds):
     a course `adds` to it, itself, how it changes and adds up; each of shape (KNOTS,)."""
     slow = _mean(motion, used)
     power = _mean((motion - motion[used].mean())**2, used)
-    warmed = []
-    for keeps in _KEEPS:
-        total, course = 0.0, []
-        for added in power:
-            total = keeps * total + (1 - keeps) * added
-            course.append(total)
-        warmed.append(np.array(course))
+    warmed = [lfilter([1 - keeps], [1, -keeps], power) for keeps in _KEEPS]
     own = [slow, np.gradient(slow), np.cumsum(slow - slow.mean())] if adds else []
     return [*own, np.sqrt(power), power, *warmed]
 
@@ -249,8 +245,8 @@ def findings(engine, fitted, stds):
     p, named, doubtful = engine.problem, [], {}
     shares = {part: share for share, part in engine.structure(fitted)}
     rows = engine.held_out_rows
-    for cause, effect in engine.search.courses.items():
-        effect = fitted.effects.get(cause, effect)
+    for cause in engine.search.courses:
+        effect = fitted.effects[cause]
         without = p.simulate({c: e for c, e in fitted.effects.items() if c != cause})
         error = (p.measured - fitted.output)[rows]
         g = gain(error + (fitted.simulated - without)[rows], error)

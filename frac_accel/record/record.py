@@ -203,7 +203,7 @@ class Record:
 
     def integrity(self, column):
         """`Integrity` of an axis of the sensor."""
-        found = self._topics[1].integrity(column, "sensor" not in self.resampled)
+        found = self._topics[1].integrity(column, not self.is_on_other_instants("sensor"))
         found.words.extend(self.words)
         step = self.step("reference", column)
         if step and step > _COARSE * np.std(self.reference[:, column]):

@@ -179,7 +179,7 @@ class Topic:
             words.append(f"a bit is stuck: the one that is worth {stuck:.6g} is the same in all "
                          "values")
         words += at_limits(self.values[:, column], lower, upper)
-        if self.is_moved or not own_instants:
+        if not own_instants:
             step = None
         return Integrity(len(self), self.missing, self.duplicates,
                          self.stamps_back, self.not_finite, jitter, step, lower, upper, words)

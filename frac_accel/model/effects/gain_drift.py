@@ -30,7 +30,7 @@ class GainDrift(Effect):
     course: tuple = coefficients("1", ())
 
     def __post_init__(self):
-        require_course(self.cause, self.course_at_s, self.course)
+        require_course(self)
 
     def simulate(self, values, circumstances):
         return values * self._gain(circumstances)
@@ -42,8 +42,7 @@ class GainDrift(Effect):
         return values / gain, variance / gain**2
 
     def _gain(self, circumstances):
-        return (1 + self.rate_per_s * circumstances.time_s
-                + along(circumstances.time_s, self.course_at_s, self.course))
+        return 1 + along(self, circumstances.time_s)
 
     @classmethod
     def column(cls, values):

@@ -29,16 +29,13 @@ class OffsetDrift(Effect):
     course: tuple = coefficients("output units", ())
 
     def __post_init__(self):
-        require_course(self.cause, self.course_at_s, self.course)
+        require_course(self)
 
     def simulate(self, values, circumstances):
-        return values + self._added(circumstances.time_s)
+        return values + along(self, circumstances.time_s)
 
     def invert(self, values, variance, circumstances):
-        return values - self._added(circumstances.time_s), variance
-
-    def _added(self, time_s):
-        return self.rate_per_s * time_s + along(time_s, self.course_at_s, self.course)
+        return values - along(self, circumstances.time_s), variance
 
     @classmethod
     def column(cls, values):
