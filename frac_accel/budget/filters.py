@@ -12,6 +12,8 @@ from .blocks import FOLDS
 _RIDGES = (1e-9, 1e-6, 1e-4, 1e-2)
 # And where the target is free of noise.
 _NO_NOISE = 1e-12
+# Products that are worked out at once.
+_TOGETHER = 1 << 19
 # Samples that are enough to learn from: of longer records, the first part of each block.
 _ENOUGH = 150_000
 
@@ -62,11 +64,9 @@ class Filters:
             share = _ENOUGH / blocks.n
             self._learnt = self._runs = [self._within(start, start + int(share * (stop - start)))
                                          for _, start, stop in blocks]
-        self._unseen = np.zeros((FOLDS, self.size, self.size))
-        for block, run in enumerate(self._runs):
-            self._unseen[block % FOLDS] += self._gram(*run)
+        self._unseen = self._grams(self._runs, FOLDS)
         self._whole = self._unseen.sum(axis=0) if self._learnt is self._runs \
-            else self._gram(*self._learnt[0])
+            else self._grams(self._learnt, 1)[0]
 
     def _within(self, start, stop):
         return min(max(start, self._first), self._last), max(min(stop, self._last), self._first)
@@ -155,34 +155,48 @@ class Filters:
             result[start:stop] = self._output(weights[block % FOLDS], start, stop)
         return result
 
-    def _gram(self, start, stop):
-        """Products of all shifted inputs over a run of samples that count."""
-        offsets = np.cumsum([0] + [high - low + 1 for low, high in self._lags])
-        gram = np.zeros((self.size, self.size))
-        if stop <= start:
-            return gram
-        for i, (a, span) in enumerate(zip(self._inputs, self._lags)):
-            for j, (b, other) in list(enumerate(zip(self._inputs, self._lags)))[i:]:
-                part = self._pair(a, b, span, other, start, stop)
-                gram[offsets[i]:offsets[i + 1], offsets[j]:offsets[j + 1]] = part
-                gram[offsets[j]:offsets[j + 1], offsets[i]:offsets[i + 1]] = part.T
-        unused = start + np.flatnonzero(~self._used[start:stop])
-        if len(unused):
-            gram -= self._outer(unused)
-        return gram
+    def _grams(self, runs, folds):
+        """Products of all shifted inputs over the samples of runs that count, added up by folds."""
+        total = np.zeros((folds, self.size, self.size))
+        together = max(_TOGETHER // self.size**2, 1)
+        for first in range(0, len(runs), together):
+            some = [(place % folds, *run) for place, run in enumerate(runs)
+                    if first <= place < first + together and run[1] > run[0]]
+            if some:
+                fold, starts, stops = np.array(some).T
+                for place, gram in zip(fold, self._products(starts, stops)):
+                    total[place] += gram
+        return total
 
-    def _pair(self, a, b, span, other, start, stop):
-        rows, columns = span[1] - span[0] + 1, other[1] - other[0] + 1
-        part = np.empty((rows, columns))
-        part[0] = self._shifted_sums(self._run(a, start - span[0], stop - span[0]), b, other, start,
-                                     stop)
-        part[:, 0] = self._shifted_sums(self._run(b, start - other[0], stop - other[0]), a, span,
-                                        start, stop)
-        change = (np.outer(self._shifts(a, span, start - 1), self._shifts(b, other, start - 1))
-                  - np.outer(self._shifts(a, span, stop - 1), self._shifts(b, other, stop - 1)))
-        for row in range(1, rows):
-            part[row, 1:] = part[row - 1, :-1] + change[row - 1, :-1]
-        return part
+    def _products(self, starts, stops):
+        """Products of all shifted inputs over the samples of each run that count, shape (runs,
+        size, size)."""
+        ends = np.cumsum([0] + [high - low + 1 for low, high in self._lags])
+        grams = np.empty((len(starts), self.size, self.size))
+        inputs = [*zip(self._inputs, self._lags, map(slice, ends[:-1], ends[1:]))]
+        for place, (a, span, rows) in enumerate(inputs):
+            for b, other, columns in inputs[place:]:
+                part = grams[:, rows, columns]
+                self._fill_pair(part, a, b, span, other, starts, stops)
+                if columns != rows:
+                    grams[:, columns, rows] = part.transpose(0, 2, 1)
+        for gram, start, stop in zip(grams, starts, stops):
+            unused = start + np.flatnonzero(~self._used[start:stop])
+            if len(unused):
+                gram -= self._outer(unused)
+        return grams
+
+    def _fill_pair(self, part, a, b, span, other, starts, stops):
+        for gram, start, stop in zip(part, starts, stops):
+            gram[0] = self._shifted_sums(a[start - span[0]:stop - span[0]], b, other, start, stop)
+            gram[:, 0] = gram[0] if a is b and span == other else self._shifted_sums(
+                b[start - other[0]:stop - other[0]], a, span, start, stop)
+        (a_in, b_in), (a_out, b_out) = ((self._shifts(a, span, at - 1)[..., None],
+                                         self._shifts(b, other, at - 1)[:, :-1])
+                                        for at in (starts, stops))
+        for row in range(1, part.shape[1]):
+            np.subtract(a_in[:, row - 1] * b_in, a_out[:, row - 1] * b_out, out=part[:, row, 1:])
+            part[:, row, 1:] += part[:, row - 1, :-1]
 
     def _run(self, values, start, stop):
         """Input from one sample to another; 0 beyond the record."""
@@ -191,9 +205,9 @@ class Filters:
         return np.pad(run, (before, after)) if before or after else run
 
     def _shifts(self, values, span, at):
-        """Values of an input at one sample, at all lags."""
+        """Values of an input at some samples, at all lags."""
         # within the record as far as it is used
-        return np.take(values, at - np.arange(span[0], span[1] + 1), mode="clip")
+        return np.take(values, at[:, None] - np.arange(span[0], span[1] + 1), mode="clip")
 
     def _shifted_sums(self, fixed, values, span, start, stop):
         """Sums of one run times an input at all lags."""
