@@ -82,6 +82,9 @@ _EDGE = 0.95
 # Damping ratio below which a link has a peak, and times what is left within half an octave of it
 # (RMS) that it must then take.
 _PEAKED, _AT_PEAK = 0.1, 10.0
+# Damping ratio above which a mode beside the sensor's own hardly rings, and below which a peak is
+# no smooth filter's.
+_RINGS, _CLEAR_PEAK = 0.3, 0.2
 _MORE = ("a linear filter would take another {:.0%} of what is left: the linear causes only "
          "imitate the true response")
 # Share of what is left that changes with time from which filters may be a mean of what moves, and
@@ -144,7 +147,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
     for cause, words in {**_parts_of_a_law(best, takes, added, left),
                          **_beside_a_strong_force(engine, best, takes, left, noise),
                          **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
-                         **_at_the_edge(engine, best),
+                         **_at_the_edge(engine, best), **_hardly_rings(engine, best),
                          **_corrections(engine, best, takes)}.items():
         doubts.setdefault(cause, words)
     if gains and (left.share > 0 or not engine.is_accounted(best, noise)):
@@ -503,6 +506,21 @@ def _at_the_edge(engine, best):
     return found
 
 
+def _hardly_rings(engine, best):
+    """Modes beside the sensor's own, with an antiresonance, that hardly ring."""
+    return {cause: f"it hardly rings (damping ratio {damping:.2g}): a part that swings by itself "
+                   "rings longer, and filters do the same"
+            for cause, effect in _filters(engine, best).items()
+            if is_link(effect) and np.size(effect.zeros()) == np.size(effect.poles()) > 0
+            and (damping := _damping(effect)) > _RINGS}
+
+
+def _damping(effect):
+    """Largest damping ratio of a link's poles; 1 where one is real."""
+    poles = np.atleast_1d(effect.poles())
+    return float(np.max(-poles.real / np.abs(poles), initial=0.0))
+
+
 def _on_both_sides(engine, best):
     """Filters of the sensor and of the reference that undo each other at an end of the band, or
     where the motion ends."""
@@ -659,7 +677,9 @@ def _acausal(engine, best, stds):
             if effect.of_reference and effect.pure_delay_s() < 0}
     lead = max(late.values(), default=0.0)
     # a digital filter of some samples delays by less than the one of its length in continuous time
+    # and a clear peak is no smooth filter's
     strange = [cause for cause in own if not best.effects[cause].everyday
+               and not 0 < _damping(best.effects[cause]) < _CLEAR_PEAK
                and not lead < min(best.effects[cause].pure_delay_s(), 1 / p.rate)]
     if late and strange and not p.record.is_reference_late:
         return dict.fromkeys([*late, *strange], f"a lead of {lead:.3g} s, which only a fit beside "

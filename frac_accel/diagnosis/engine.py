@@ -11,7 +11,7 @@ from ..budget import Division, established_noise
 from ..errors import FracAccelError
 from ..identification.fit.uncertainty import by_blocks, sandwich
 from ..identification.response.excitation import held_out, is_new
-from ..model import AxisModel, is_link
+from ..model import is_link
 from ..model.effects import effect_of
 from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
@@ -62,8 +62,6 @@ _SAME = 1.0
 _ALONE = 10.0
 # Share of the residual's power for which a coarse lattice must account.
 _COARSE = 0.2
-# Frequencies over which a density is integrated.
-_LINES = 2049
 # Error of a simulation, and of values put on other instants, over the output's spread.
 _SIMULATED, _RESAMPLED = 3e-5, 1e-4
 
@@ -86,6 +84,7 @@ class Engine:
         slices, given = stretches_of(record, axis), (record, axis, baseline, used, limit)
         self.problem = Stretches(*given, slices, in_own_core) if slices[1:] else \
             Problem(*given, in_own_core)
+        self.problem.passed_on = passed_on
         self.part = None
         # `Integrity` of the record, where what it shows by itself is looked for
         self.found = None
@@ -98,8 +97,6 @@ class Engine:
         self.search = Search(self.problem, base, candidates, stages)
         # `Open` by cause: what is known of the parameters that are free in every fit
         self.loose = loose or {}
-        # `ReferenceNoise` that is too little to bend a fit, and counts behind no filter; or None
-        self.passed_on = passed_on
         # what counts in no fit, since a signal was at fault there
         self.aside = self.spikes = np.zeros(len(record), bool)
         # samples that say nothing of other causes, by what the record shows by itself: those at a
@@ -146,7 +143,7 @@ class Engine:
             rows = p.strongest(LONG // 2)
             self.part = Engine(p.part(rows), p.axis, p.baseline, p.taken(self.wanted)[rows],
                                self.search.base, self.search.candidates, self.search.stages,
-                               self._step, p.limit.of_part(), self.passed_on, self.loose,
+                               self._step, p.limit.of_part(), p.passed_on, self.loose,
                                p.in_own_core)
             self.part.identified, self.part.found = self.identified, self.found
             self.part.search.courses = self.search.courses
@@ -362,21 +359,13 @@ class Engine:
 
     def by_reference(self, fitted):
         """RMS [output units] of what a fit leaves because the reference does not show it."""
-        p = self.problem
-        frequency = np.linspace(0, p.rate / 2, _LINES)[1:]
-        model = p.axis_model(fitted.effects)
-        sensor = AxisModel(model.core, tuple(e for e in model.effects if not e.of_reference))
-        density = sum(e.unknown_density(frequency) for e in model.effects if e.of_reference)
-        if self.passed_on:
-            density = density + self.passed_on.density(frequency)
-        gain = np.abs(sensor.transfer_function(2j * np.pi * frequency))
-        return float(np.sqrt(np.mean(gain**2 * density) * p.rate / 2))
+        return float(np.sqrt(self.problem.by_reference(fitted.effects)))
 
     def _no_fault(self, fitted):
         """Share of a residual's power that follows the motion and is no fault of the model:
         numerics, and noise of the reference that the model passes on; none of the latter where the
         reference counts behind a filter of that noise."""
-        own = self.by_reference(fitted) if self.passed_on else 0.0
+        own = self.by_reference(fitted) if self.problem.passed_on else 0.0
         return (own**2 + self.floor**2) / max(self.rms(fitted.residual), 1e-300)**2
 
     def budget(self, fitted, hidden=None):

@@ -301,6 +301,9 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     suspects += [_suspect({cause}, 0.0, words) for cause, words in (near | other_course).items()]
     unnamed += sorted(other_course)
     findings = [*findings, *away, *drifts, *shown_by(fitted)]
+    # what was in doubt in a part of the record, or beside something else, is no suspect any more
+    suspects = [each for each in suspects
+                if not {f.cause for f in findings}.issuperset(each["causes"])]
     if any(f.effect.goes_with_size for f in findings):
         left = dataclasses.replace(left, level_score=0.0)
         fraction = fraction if left.share > 0 else 0.0

@@ -28,6 +28,8 @@ _SINGULAR = 1e-10
 # the cause adds, where measured) and for its derivatives (ten times that, which bends no fit).
 _STEPS = 4
 _STEPS_OF_SLOPES = 2
+# Frequencies over which a density is integrated.
+_LINES = 2049
 # Times the largest measured value from which a simulated one counts as without a bound.
 _UNBOUND = 1e6
 # A gain of this share of one sample's error changes nothing that the data can tell.
@@ -63,7 +65,7 @@ class Point(NamedTuple):
     residual : ndarray, shape (n,)
         Measured less simulated and free motions [output units]; 0 where a sample does not count.
     cost : float
-        Sum of the squares of the residual.
+        Sum of the squares of the residual, and of the reference's noise that is kept from it.
     """
 
     effects: dict
@@ -174,6 +176,8 @@ class Problem:
     def __init__(self, record, axis, baseline, used, limit=None, in_own_core=()):
         self.record, self.axis, self.baseline = record, axis, baseline
         self.in_own_core = in_own_core
+        # `ReferenceNoise` that counts behind no filter, and its power behind the model in use
+        self.passed_on = self._passed = None
         self.limit = limit or TimeLimit()
         self.rate = record.sampling_rate_hz
         self.time = np.arange(len(record)) / self.rate  # since this part's start
@@ -476,7 +480,28 @@ class Problem:
         components = free.products(error)
         residual = free.add_to(error, -components)
         return Point(effects, simulated, columns, free, back @ components, residual,
-                     float(residual @ residual))
+                     float(residual @ residual) + self._kept_off(effects))
+
+    def by_reference(self, effects):
+        """Power [output units squared] of what a fit leaves because the reference does not show
+        it."""
+        frequency = np.linspace(0, self.rate / 2, _LINES)[1:]
+        model = self.axis_model(effects)
+        sensor = AxisModel(model.core, tuple(e for e in model.effects if not e.of_reference))
+        density = sum(e.unknown_density(frequency) for e in model.effects if e.of_reference)
+        if self.passed_on:
+            density = density + self.passed_on.density(frequency)
+        gain = np.abs(sensor.transfer_function(2j * np.pi * frequency))
+        return float(np.mean(gain**2 * density) * self.rate / 2)
+
+    def _kept_off(self, effects):
+        """What a fit leaves less as it keeps noise of the reference, which the record shows, from
+        the output: that speaks for no filter."""
+        if not self.passed_on:
+            return 0.0
+        if self._passed is None:
+            self._passed = self.by_reference({})
+        return self.count * max(self._passed - self.by_reference(effects), 0.0)
 
     def _require_bound(self, simulated):
         """Refuse an output that is out of all proportion: one that only begins to grow beyond all

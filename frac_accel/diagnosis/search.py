@@ -523,7 +523,7 @@ class Search:
 
     def without(self, fitted, cause, goal=np.inf):
         """The same set without one cause, fitted anew; not to the end if no pace to a goal."""
-        less = {name: effect for name, effect in fitted.effects.items() if name != cause}
+        less = self._left_to_others(fitted, cause)
         self._forget_worse(less, goal)
         found = next(iter(self.fit_all([less], fitted.cost, goal)), None)
         found = found or self.fit(less)
@@ -532,6 +532,19 @@ class Search:
             # a filter of another order has another delay
             found = self.varied(found)
         return found
+
+    def _left_to_others(self, fitted, cause):
+        """Effects of a fit without one cause; what it says of the core is left to the others that
+        can say it, if that describes the record better."""
+        less = {name: effect for name, effect in fitted.effects.items() if name != cause}
+        if not fitted.effects[cause].restates_core:
+            return less
+        own = self.problem.baseline.axis(self.problem.axis).core
+        core = self.problem.axis_model(fitted.effects).effective_core
+        told = {name: effect.restating(core, own) if effect.restates_core else effect
+                for name, effect in less.items()}
+        return less if told == less else min(
+            less, told, key=functools.partial(self.problem.cost, rough=True))
 
 
 def acts_as_filter(effect):

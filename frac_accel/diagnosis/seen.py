@@ -5,8 +5,10 @@ import functools
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import periodogram
 
 from ..model.effects import known_effects
+from ..record.resampling import filled, inner_taps
 from ..signals.convolution import Convolution
 from .gain import gain
 from .leftover import rounding_errors
@@ -51,6 +53,30 @@ class Seen:
     spikes: np.ndarray
     is_coarse: bool
     parts: object
+
+    @functools.cached_property
+    def of_one_error(self):
+        """What comparing the two makes of an error of 1 in one of the sensor's samples, around it,
+        shape (2 k + 1,); None where it is no sample of its own."""
+        if "sensor" in self.record.resampled:
+            return None
+        if self.record.band_hz is None:
+            return np.ones(1)
+        return inner_taps(self.record.sampling_rate_hz, self.record.band_hz, len(self.output))
+
+    def slope_beyond(self, noise):
+        """Power of the sensor's slope [output units a sample] beyond the band that is compared.
+
+        `noise` is the power that errors have within the band, and as densely beyond it.
+        """
+        record, topic = self.record, self.record.topics[1]
+        if record.band_hz is None:
+            return 0.0
+        values = filled(topic.clock.slot, topic.values)[0][:, self.axis]
+        turns, density = periodogram(values, window="hann")
+        band = record.band_hz / record.sampling_rate_hz
+        moving = np.maximum(density - noise / band, 0.0)[turns > band]
+        return float(np.sum((2 * np.pi * turns[turns > band])**2 * moving) * turns[1])
 
     def rounding(self):
         """Errors, shape (n,), that a coarse lattice leaves of noisy simulated values."""

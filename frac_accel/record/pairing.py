@@ -15,6 +15,8 @@ _NO_DRIFT = 0.02
 _UNSURE = 6.0
 # Rates this far apart are of two devices, whatever the drift: no short record leaves it open.
 _SAME_RATE = 1e-3
+# Share of the samples that must stay for those near gaps to be left out.
+_CLEAR = 0.5
 # Ratio of the rates up to which the sensor keeps its own instants though it is the faster one.
 _ALIKE = 1.01
 
@@ -25,6 +27,7 @@ class Paired(NamedTuple):
     sampling_rate_hz: float
     reference: np.ndarray
     sensor: np.ndarray
+    present: tuple
     valid: np.ndarray
     lag_s: float
     start_ns: int
@@ -58,12 +61,10 @@ def by_slots(one, two):
     last = int(min(slots[0][-1], slots[1][-1]))
     if last - first + 1 < FEWEST:
         raise _apart(one, two)
-    present, gridded = np.ones(last - first + 1, bool), []
-    for slot, topic in zip(slots, (one, two)):
-        values, here = _on_slots(slot, topic.values, first, last)
-        present &= here
-        gridded.append(values)
-    return Paired(rate, *gridded, present, lag * 1e-9, int(start + first * interval))
+    gridded, present = zip(*(_on_slots(slot, topic.values, first, last)
+                             for slot, topic in zip(slots, (one, two))))
+    return Paired(rate, *gridded, present, present[0] & present[1], lag * 1e-9,
+                  int(start + first * interval))
 
 
 def by_stamps(one, two):
@@ -94,20 +95,25 @@ def by_stamps(one, two):
             raise _apart(one, two)
         raise FracAccelError(f"the {said}: {max(count, 0)} instants in common are left at "
                              f"{rate:.6g} Hz, expected at least {FEWEST}: record longer")
-    gridded, present = [], np.ones(count, bool)
+    gridded, present = [], []
     for i, signal in enumerate(signals):
         if i == base:
             place = round((first - signal.start_s) * rate)
             gridded.append(signal.values[place:place + count])
-            present &= signal.present[place:place + count]
+            present.append(signal.present[place:place + count])
             continue
         frame = signal.rate_hz, signal.start_s, rate, first, count
         gridded.append(resampling.band_limited(signal.values, *frame))
-        present &= resampling.untouched(signal.present, *frame)
+        present.append(resampling.untouched(signal.present, *frame))
+    valid = present[0] & present[1]
+    if base is not None:
+        # what is beyond the band is taken from the base, too: near a gap that is a guess
+        clear = valid & resampling.untouched(present[base], rate, 0.0, rate, 0.0, count)
+        valid = clear if clear.sum() > _CLEAR * valid.sum() else valid
     changed = tuple(name for i, name in enumerate(("reference", "sensor")) if i != base)
     band = resampling.BAND * rate
-    return Paired(rate, *gridded, present, 0.0, origin + round(first * 1e9), band, changed,
-                  (f"the {said}: compared at {rate:.6g} Hz up to {band:.4g} Hz",))
+    return Paired(rate, *gridded, tuple(present), valid, 0.0, origin + round(first * 1e9), band,
+                  changed, (f"the {said}: compared at {rate:.6g} Hz up to {band:.4g} Hz",))
 
 
 class _Signal(NamedTuple):

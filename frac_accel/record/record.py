@@ -12,7 +12,7 @@ from .held import first_of_held
 from .instants import put_on_instants
 from .pairing import FEWEST, by_slots, by_stamps, same_clock
 from .relation import clock_offset, refined
-from .resampling import within
+from .resampling import guessed, within
 from .temperature import Temperature
 from .topic import Topic
 
@@ -71,6 +71,8 @@ class Record:
     since_start_s : float
         Time [s] from the sensor's first sample, from which drifts and steps count, to its first
         one here.
+    present : tuple of ndarray of bool, shape (n,), or None
+        Where reference and sensor each have a sample; None where only `valid` is known.
 
     Examples
     --------
@@ -95,6 +97,7 @@ class Record:
     words: tuple = ()
     topics: tuple | None = None
     since_start_s: float = 0.0
+    present: tuple | None = None
 
     def __len__(self):
         return len(self.valid)
@@ -109,6 +112,7 @@ class Record:
         celsius = None if self.temperature_c is None else self.temperature_c[rows]
         return dataclasses.replace(
             self, reference=self.reference[rows], sensor=self.sensor[rows], valid=self.valid[rows],
+            present=self.present and tuple(there[rows] for there in self.present),
             temperature_c=celsius,
             start_ns=self.start_ns + int(rows.start * 1e9 / self.sampling_rate_hz),
             since_start_s=self.since_start_s + rows.start / self.sampling_rate_hz)
@@ -120,12 +124,14 @@ class Record:
         """
         if self.band_hz is None or not used.any():
             return self
-        reference, sensor, missing = self.reference.copy(), self.sensor.copy(), ~self.valid
-        for values, wrong in ((reference, np.zeros(len(self), bool)),
-                              (sensor, self.valid & ~used)):
-            values[:, column] = within(values[:, column], self.sampling_rate_hz, self.band_hz,
-                                       wrong, missing)
-        return dataclasses.replace(self, reference=reference, sensor=sensor)
+        unknown = [~there for there in self.present] if self.present else [~self.valid] * 2
+        unknown[1] = unknown[1] | (self.valid & ~used)
+        signals = self.reference.copy(), self.sensor.copy()
+        guesses = [guessed(values[:, column], other[:, column], which) for values, other, which in
+                   zip(signals, signals[::-1], unknown)]
+        for values, guess, which in zip(signals, guesses, unknown):
+            values[:, column] = within(guess, self.sampling_rate_hz, self.band_hz, which)
+        return dataclasses.replace(self, reference=signals[0], sensor=signals[1])
 
     def instants_of(self, which, column):
         """Mask, shape (n,): instants at which the sensor's value comes from some of its samples.
@@ -268,13 +274,14 @@ class Record:
         paired = by_slots(one, two) if same_clock(one, two) else by_stamps(one, two)
         stated = sensor.variance[:, column]
         std = np.sqrt(np.nanmean(stated)) if np.isfinite(stated).any() else np.nan
-        last = int(np.flatnonzero(paired.valid)[-1]) + 1 if paired.valid.any() else 0
-        if np.count_nonzero(paired.valid) < FEWEST // 2:
-            raise FracAccelError(f"reference and sensor have {np.count_nonzero(paired.valid)} "
+        valid = paired.valid
+        last = int(np.flatnonzero(valid)[-1]) + 1 if valid.any() else 0
+        if np.count_nonzero(valid) < FEWEST // 2:
+            raise FracAccelError(f"reference and sensor have {np.count_nonzero(valid)} "
                                  f"instants in common, expected at least {FEWEST}")
         lag = paired.lag_s
         if offset is not None:
-            rest = refined(paired.reference, paired.sensor, paired.valid, paired.sampling_rate_hz,
+            rest = refined(paired.reference, paired.sensor, valid, paired.sampling_rate_hz,
                            offset.seconds - taken_out - lag, paired.band_hz)
             if rest is not None:
                 offset = dataclasses.replace(rest, seconds=rest.seconds + lag + taken_out)
@@ -287,10 +294,11 @@ class Record:
             celsius = Temperature.of(temperature)(
                 paired.start_ns + round(taken_out * 1e9) + instants)
         return cls(paired.sampling_rate_hz, paired.reference[:last], paired.sensor[:last],
-                   paired.valid[:last], lag, paired.start_ns, float(std), celsius,
+                   valid[:last], lag, paired.start_ns, float(std), celsius,
                    paired.band_hz, paired.resampled, offset and offset.seconds,
                    offset and offset.std_s, taken_out, (*words, *paired.words), (one, two),
-                   1e-9 * (paired.start_ns - int(two.stamps_ns[0])) + lag)
+                   1e-9 * (paired.start_ns - int(two.stamps_ns[0])) + lag,
+                   tuple(there[:last] for there in paired.present))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

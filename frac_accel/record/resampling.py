@@ -19,6 +19,9 @@ REACH = int(np.ceil((_ATTENUATION_DB - 7.95) / (2.285 * 2 * np.pi * (_GONE - BAN
 # [periods of the band's edge].
 _INNER = 0.8
 _INNER_TAPS = (_ATTENUATION_DB - 7.95) / (2.285 * 2 * np.pi * (1 - _INNER)) / 2
+# Half-width of the filter by which what is missing of one signal is guessed from the other, samples
+# that are enough to fit it to, and share of the power that it may leave.
+_GUESSED_TAPS, _GUESSED_ROWS, _GUESSED_LEFT = 16, 20_000, 0.1
 # Steps by which samples are bridged, and share of what they leave beyond the band (power) from
 # which there are no more.
 _STEPS, _BRIDGED = 12, 1e-6
@@ -85,31 +88,69 @@ def band_limited(values, rate_hz, start_s, target_hz, target_start_s, count):
     return result
 
 
-def within(values, rate_hz, band_hz, wrong, missing):
+def inner_taps(rate_hz, band_hz, count):
+    """The filter by which `within` leaves out what is beyond a band of so many samples."""
+    from scipy.signal import firwin
+    half = min(int(np.ceil(_INNER_TAPS * rate_hz / band_hz)), count - 1)
+    return firwin(2 * half + 1, (1 + _INNER) / 2 * band_hz, window=("kaiser", _KAISER), fs=rate_hz)
+
+
+def within(values, rate_hz, band_hz, unknown):
     """Uniform samples without what is beyond a band, by a filter of linear phase without delay.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
     rate_hz, band_hz : float
-    wrong, missing : ndarray of bool, shape (n,)
-        Samples whose values are of no use, and those whose values are bridged already: both are
-        found anew, so that least of all is beyond the band.
+    unknown : ndarray of bool, shape (n,)
+        Samples whose values are a guess, from which they are changed so that least of all is beyond
+        the band.
 
     Returns
     -------
     ndarray, shape (n,)
     """
-    from scipy.signal import firwin, oaconvolve
-    half = min(int(np.ceil(_INNER_TAPS * rate_hz / band_hz)), len(values) - 1)
-    taps = firwin(2 * half + 1, (1 + _INNER) / 2 * band_hz, window=("kaiser", _KAISER), fs=rate_hz)
+    from scipy.signal import oaconvolve
+    taps = inner_taps(rate_hz, band_hz, len(values))
+    half = len(taps) // 2
 
     def inside(values):
         longer = np.pad(values, half, mode="reflect", reflect_type="odd")
         return oaconvolve(longer, taps, mode="valid")
-    place = np.arange(len(values))
-    values = np.interp(place, place[~wrong], values[~wrong])
-    return inside(_bridged(values, wrong | missing, inside))
+    return inside(_bridged(values, unknown, inside))
+
+
+def guessed(values, other, unknown):
+    """Values of which some are unknown, these as a short filter of another signal has them that
+    fits the rest; on a straight line between their neighbours where the two share too little.
+
+    Parameters
+    ----------
+    values, other : ndarray, shape (n,)
+    unknown : ndarray of bool, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    from scipy.signal import fftconvolve
+    if not unknown.any() or unknown.all():
+        return values
+    place, known = np.arange(len(values)), np.flatnonzero(~unknown)
+    mean = values[known].mean()
+    moving, other = np.where(unknown, 0.0, values - mean), other - other.mean()
+    shared = np.abs(fftconvolve(moving, other[::-1]))
+    lags = np.argmax(shared) - len(other) + 1 + np.arange(-_GUESSED_TAPS, _GUESSED_TAPS + 1)
+
+    def shifted(rows):
+        return np.take(other, rows[:, None] - lags, mode="clip")
+    rows = known[::max(len(known) // _GUESSED_ROWS, 1)]
+    columns = shifted(rows)
+    taps, *_ = np.linalg.lstsq(columns, moving[rows], rcond=1e-6)
+    result = np.interp(place, known, values[known])
+    if np.var(moving[rows] - columns @ taps) < _GUESSED_LEFT * np.var(moving[rows]):
+        result[unknown] = mean + shifted(place[unknown]) @ taps
+    return result
 
 
 def _bridged(values, missing, inside):

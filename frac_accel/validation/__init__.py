@@ -255,7 +255,7 @@ def _nrmse(measured, simulated, pair):
     error = measured - simulated
     if pair.band_hz:
         none = np.zeros(len(error), bool)
-        error, measured = (within(values, pair.sampling_rate_hz, pair.band_hz, none, none)
+        error, measured = (within(values, pair.sampling_rate_hz, pair.band_hz, none)
                            for values in (error, measured))
     return float(np.sqrt(np.mean(error**2)) / np.std(measured))
 

@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from scipy.signal import oaconvolve
 
 from ..parameters import parameter
 from .base import STAMPS, Effect, Reading
@@ -40,14 +41,16 @@ class SamplingJitter(Effect):
     @classmethod
     def recognised(cls, seen, shown):
         """The residual's power is noise and J**2 times the slope's, sample by sample."""
-        if seen.found.jitter_rms_s or seen.record.resampled:
+        around = seen.of_one_error
+        if seen.found.jitter_rms_s or around is None:
             return None  # stamps that scatter do the same, and so do values between samples
         rate, used = seen.record.sampling_rate_hz, seen.used
         error = (seen.measured - seen.output)[used]
         slope = slope_of(seen.output)
         measures = {"slope": slope, "level": seen.output - seen.output[used].mean(),
                     "bend": np.gradient(np.gradient(seen.output))}
-        squares = {name: np.square(values[used]) for name, values in measures.items()}
+        squares = {name: oaconvolve(np.square(values), around**2, "same")[used]
+                   for name, values in measures.items()}
         fits = {name: variance_law(error, square) for name, square in squares.items()}
         noise, factor, std = fits["slope"]
         if seen.is_coarse:
@@ -66,12 +69,17 @@ class SamplingJitter(Effect):
         if not all(follows(error, power, squares[name]) for name in ("slope", "level")):
             return None
         shift = error * slope[used] / power
-        if any(abs(np.corrcoef(shift[lag:], shift[:-lag])[0, 1]) > _INDEPENDENT
-               for lag in (1, 2, 3)):
+        alike = np.correlate(around, around, "full")[len(around):] / (around @ around)
+        if any(abs(np.corrcoef(shift[lag:], shift[:-lag])[0, 1]) > _INDEPENDENT + abs(own)
+               for lag, own in zip((1, 2, 3), np.r_[alike, np.zeros(3)])):
             return None
-        rms = float(np.sqrt(factor))
+        # what is faster than what is compared has instants that scatter, too
+        known = squares["slope"].mean() / np.sum(around**2)
+        less = known / (known + seen.slope_beyond(np.mean(error**2)))
+        rms = float(np.sqrt(less * factor))
         after = error * np.sqrt(noise / power)
         return cls(rms / rate), Reading(
-            {"rms_s": float(std / (2 * rms) / rate)}, error, after,
+            {"rms_s": float(np.hypot(less * std / (2 * rms), (1 - less) * rms / 4) / rate)}, error,
+            after,
             f"the error's power follows the square of the slope: {share:.0%} of it, "
             f"{factor / std:.3g} standard deviations from none")
