@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
-from scipy.signal import oaconvolve
+from scipy.signal import fftconvolve, oaconvolve
 
 from .blocks import FOLDS
 
@@ -12,8 +12,8 @@ from .blocks import FOLDS
 _RIDGES = (1e-9, 1e-6, 1e-4, 1e-2)
 # And where the target is free of noise.
 _NO_NOISE = 1e-12
-# Products that are worked out at once.
-_TOGETHER = 1 << 19
+# Products that are worked out at once, and lags from which transforms are faster.
+_TOGETHER, _MANY_LAGS = 1 << 19, 100
 # Samples that are enough to learn from: of longer records, the first part of each block.
 _ENOUGH = 150_000
 
@@ -212,7 +212,9 @@ class Filters:
     def _shifted_sums(self, fixed, values, span, start, stop):
         """Sums of one run times an input at all lags."""
         moving = self._run(values, start - span[1], stop - span[0])
-        return np.correlate(moving, fixed, "valid")[::-1]
+        if min(len(fixed), span[1] - span[0]) < _MANY_LAGS:
+            return np.correlate(moving, fixed, "valid")[::-1]
+        return fftconvolve(moving, fixed[::-1], "valid")[::-1]
 
     def _right(self, target, start, stop):
         if stop <= start:

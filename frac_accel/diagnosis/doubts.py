@@ -148,6 +148,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **_beside_a_strong_force(engine, best, takes, left, noise),
                          **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
                          **_at_the_edge(engine, best), **_hardly_rings(engine, best),
+                         **_out_of_sight(engine, best),
                          **_corrections(engine, best, takes)}.items():
         doubts.setdefault(cause, words)
     if gains and (left.share > 0 or not engine.is_accounted(best, noise)):
@@ -506,6 +507,16 @@ def _at_the_edge(engine, best):
     return found
 
 
+def _out_of_sight(engine, best):
+    """Filters of the sensor without a peak whose corners lie beyond all that is compared."""
+    edge = _end_of_band_hz(engine.problem)
+    return {cause: f"its corner, {lowest:.3g} Hz, lies beyond what is compared ({edge:.3g} Hz): "
+                   "there many filters do the same"
+            for cause, effect in _filters(engine, best).items()
+            if is_link(effect) and not effect.of_reference and _damping(effect) > _RINGS
+            and (lowest := np.abs(effect.poles()).min() / (2 * np.pi)) > edge}
+
+
 def _hardly_rings(engine, best):
     """Modes beside the sensor's own, with an antiresonance, that hardly ring."""
     return {cause: f"it hardly rings (damping ratio {damping:.2g}): a part that swings by itself "
@@ -678,8 +689,8 @@ def _acausal(engine, best, stds):
     lead = max(late.values(), default=0.0)
     # a digital filter of some samples delays by less than the one of its length in continuous time
     # and a clear peak is no smooth filter's
+    own = [cause for cause in own if not 0 < _damping(best.effects[cause]) < _CLEAR_PEAK]
     strange = [cause for cause in own if not best.effects[cause].everyday
-               and not 0 < _damping(best.effects[cause]) < _CLEAR_PEAK
                and not lead < min(best.effects[cause].pure_delay_s(), 1 / p.rate)]
     if late and strange and not p.record.is_reference_late:
         return dict.fromkeys([*late, *strange], f"a lead of {lead:.3g} s, which only a fit beside "

@@ -16,8 +16,8 @@ _NEIGHBOURS = 15
 # of the scatter].
 _GAP, _OUTLIER = 10.0, 25.0
 _FIRST_PART = 64
-# Length of the mean of stamps on the circle of an interval from which there are instants: 0 without,
-# 0.3 where they scatter by a quarter of it.
+# Length of the mean of stamps on the circle of an interval from which there are instants: 0
+# without, 0.3 where they scatter by a quarter of it.
 _TOGETHER = 0.2
 # Stamps to which a rate is tuned first, and how far it may be off.
 _TUNED, _DETUNED = 256, 0.15
@@ -276,8 +276,9 @@ def long_term_rate(stamps):
 
 def _tuned(seconds, interval):
     """Scatter [intervals], interval and places of the instants on which most stamps lie, however
-    many are lost: the highest peak of the stamps' spectrum near that of another interval (Rayleigh's
-    statistic; K. V. Mardia, P. E. Jupp, *Directional Statistics* (2000), section 6.3)."""
+    many are lost: the highest peak of the stamps' spectrum near that of another interval
+    (Rayleigh's statistic; K. V. Mardia, P. E. Jupp, *Directional Statistics* (2000), section 6.3).
+    """
     length, low, high = _TUNED, (1 - _DETUNED) / interval, (1 + _DETUNED) / interval
     while True:
         part = seconds[:length]

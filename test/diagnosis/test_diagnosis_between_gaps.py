@@ -1,5 +1,5 @@
-"""A slower sensor with a clock of its own: stamps that scatter, messages lost in runs, instants that
-scatter though the stamps do not."""
+"""A slower sensor with a clock of its own: stamps that scatter, messages lost in runs, instants
+that scatter though the stamps do not."""
 
 import numpy as np
 import pytest
@@ -67,5 +67,5 @@ def test_instants_that_scatter_are_found_where_the_reference_is_faster(seed):
     found = frac_accel.diagnose(topics, time_limit_s=60.0)
     assert [finding.cause for finding in found.findings] == ["sampling_jitter"]
     value, std = found.findings[0].effect.rms_s, found.findings[0].std["rms_s"]
-    # of the drawn ones, of which a thousandth and more of the power is fast than what is compared
+    # of the drawn ones, which scatter by themselves
     assert abs(value / scatter - 1) < 0.03 and std < 0.02 * scatter

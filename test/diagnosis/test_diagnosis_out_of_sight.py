@@ -1,0 +1,87 @@
+"""What lies beyond all that is compared, or hides in a fit: it must not lend its doings to a name."""
+
+import numpy as np
+import pytest
+from rig.oscillator import integrate
+from scipy.signal import butter, cont2discrete, lfilter, sosfilt
+from shaken import OVERSAMPLING, measured, shocks
+
+import frac_accel
+from frac_accel import SensorModel
+from frac_accel.model.core import Gain
+
+
+def random_motion(rng, rate, n, low_hz, high_hz):
+    return sosfilt(butter(4, [low_hz, high_hz], "band", fs=rate * OVERSAMPLING, output="sos"),
+                   rng.normal(size=n * OVERSAMPLING))
+
+
+def shaken_by_pulses(rng, rate, n, *pulses):
+    """Pulses on a bench that never quite stands still."""
+    motion = shocks(rng, rate, n, *pulses)
+    background = random_motion(rng, rate, n, 0.01 * rate, 0.1 * rate)
+    return motion + 0.02 * motion.std() * background / background.std()
+
+
+def sampled(rng, signals, noise):
+    """Every sixteenth sample, with white noise of a share of each one's RMS."""
+    return tuple(values[::OVERSAMPLING] + share * values.std() * rng.normal(
+        size=len(values) // OVERSAMPLING) for values, share in zip(signals, noise))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_core_beyond_the_nyquist_frequency_is_no_filter_and_no_mode(seed):
+    rng = np.random.default_rng(seed)
+    motion = shaken_by_pulses(rng, 10_000.0, 40_000, 9, 2e-3, 400.0)
+    pair = measured(rng, motion, 10_000.0, rng.uniform(9000, 12_000), rng.uniform(0.5, 0.7), 50, 40)
+    found = frac_accel.diagnose(pair, sampling_rate_hz=10_000.0, time_limit_s=60.0)
+    assert not {f.cause for f in found.findings} - {"time_delay", "reference_noise"}
+    assert found.verdict in ("consistent", "explained")
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_sharp_mount_is_named_beside_a_late_reference(seed):
+    rng, rate, n = np.random.default_rng(seed), 2000.0, 40_000
+    motion = random_motion(rng, rate, n, 4.0, 700.0)
+    omega, zeta = 2 * np.pi * rng.uniform(300, 600), rng.uniform(0.05, 0.12)
+    top, bottom, _ = cont2discrete(([2 * zeta * omega, omega**2], [1, 2 * zeta * omega, omega**2]),
+                                   1 / (rate * OVERSAMPLING), "foh")
+    late = int(rng.integers(6, 40))  # of 1/32 ms, shorter than a sampling interval or longer
+    output = lfilter(top[0], bottom, motion)
+    pair = sampled(rng, (np.roll(motion, late), output), (0.004, 0.003))
+    found = frac_accel.diagnose(pair, SensorModel(Gain(1.0)), sampling_rate_hz=rate,
+                                time_limit_s=60.0)
+    effects = {f.cause: f.effect for f in found.findings}
+    assert effects.keys() == {"mounting_resonance", "reference_delay"}
+    assert abs(effects["mounting_resonance"].frequency_hz / (omega / 2 / np.pi) - 1) < 1e-3
+    assert abs(effects["reference_delay"].delay_s * rate * OVERSAMPLING - late) < 0.1
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_noise_of_the_reference_that_a_filter_keeps_off_is_no_evidence_for_it(seed):
+    # slow pulses, in which a delay and a low-pass are nearly the same, and white noise
+    rng, rate, n = np.random.default_rng(seed), 2000.0, 40_000
+    motion = shaken_by_pulses(rng, rate, n, 6, 0.1, 150.0)
+    delay = rng.uniform(0.6e-3, 1.4e-3)
+    late = int(round(delay * rate * OVERSAMPLING))
+    pair = sampled(rng, (motion, np.roll(motion, late)), (0.006, 0.004))
+    found = frac_accel.diagnose(pair, SensorModel(Gain(1.0)), sampling_rate_hz=rate,
+                                time_limit_s=60.0)
+    assert [f.cause for f in found.findings] == ["time_delay"]
+    finding = found.findings[0]
+    assert abs(finding.effect.delay_s - late / (rate * OVERSAMPLING)) < 4 * finding.std["delay_s"]
+
+
+@pytest.mark.parametrize("seed", [7, 8])
+def test_damping_that_grows_with_speed_brings_no_fractional_order(seed):
+    rng, rate, n = np.random.default_rng(seed), 500.0, 20_000
+    base = random_motion(rng, rate, n, 1.0, 60.0) * np.clip(
+        np.arange(n * OVERSAMPLING) / (rate * OVERSAMPLING), 0, 1)
+    base *= 3.0 / base.std()
+    coefficient = rng.uniform(0.05, 0.15)
+    motion = integrate(np.append(base, base[-1]), 1 / (rate * OVERSAMPLING), rng.uniform(35, 60),
+                       rng.uniform(0.05, 0.15), quadratic_damping=coefficient).q[:len(base)]
+    pair = sampled(rng, (base, motion), (0.003, 0.002))
+    found = frac_accel.diagnose(pair, sampling_rate_hz=rate, time_limit_s=60.0)
+    assert [f.cause for f in found.findings] == ["quadratic_damping"]
+    assert abs(found.findings[0].effect.coefficient / coefficient - 1) < 0.01
