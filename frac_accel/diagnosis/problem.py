@@ -32,6 +32,9 @@ _STEPS_OF_SLOPES = 2
 _UNBOUND = 1e6
 # A gain of this share of one sample's error changes nothing that the data can tell.
 _SMALL_GAIN = 1e-2
+# Largest step of a fit, in units of an unknown: a gain of one must not end at just none, beside
+# which nothing else would have a derivative.
+_LONGEST = 0.99
 
 
 @dataclasses.dataclass(frozen=True)
@@ -442,8 +445,8 @@ class Problem:
         low, high = np.array([(u.low, u.high) for u in here.unknowns]).T
         for _ in range(_TRIES):
             gram, slope = _normal(here)
-            step = _step(gram, slope, damping, np.maximum(low - here.theta, -1.0),
-                         np.minimum(high - here.theta, 1.0))
+            step = _step(gram, slope, damping, np.maximum(low - here.theta, -_LONGEST),
+                         np.minimum(high - here.theta, _LONGEST))
             promised = 2 * step @ slope - step @ gram @ step
             if promised < small or here.trust * promised < needed:
                 here.settled = promised < small and damping < 1e-2
