@@ -32,9 +32,6 @@ _STEPS_OF_SLOPES = 2
 _UNBOUND = 1e6
 # A gain of this share of one sample's error changes nothing that the data can tell.
 _SMALL_GAIN = 1e-2
-# Largest step of a fit, in units of an unknown: a gain of one must not end at just none, beside
-# which nothing else would have a derivative.
-_LONGEST = 0.99
 
 
 @dataclasses.dataclass(frozen=True)
@@ -442,11 +439,16 @@ class Problem:
         be trusted, less than the `needed` one.
         """
         spared = len({*map(acts_on_spring, here.effects.values())}) > 1
+        # a gain of just none is no end: nothing else has a derivative there, or a size
+        is_still = not np.ptp(here.simulated)
+        small = 0.0 if is_still else small
         low, high = np.array([(u.low, u.high) for u in here.unknowns]).T
         for _ in range(_TRIES):
             gram, slope = _normal(here)
-            step = _step(gram, slope, damping, np.maximum(low - here.theta, -_LONGEST),
-                         np.minimum(high - here.theta, _LONGEST))
+            if is_still:
+                gram, slope = _of_largest(gram, slope)
+            step = _step(gram, slope, damping, np.maximum(low - here.theta, -1.0),
+                         np.minimum(high - here.theta, 1.0))
             promised = 2 * step @ slope - step @ gram @ step
             if promised < small or here.trust * promised < needed:
                 here.settled = promised < small and damping < 1e-2
@@ -654,6 +656,13 @@ def _from_theta(value, unknown):
 def _normal(fit):
     """Products of the derivatives among themselves and with the residual."""
     return fit.jacobian.T @ fit.jacobian, fit.jacobian.T @ fit.residual
+
+
+def _of_largest(gram, slope):
+    """The same of the unknown that changes the output most, alone: beside a gain of none the others
+    change what was before the record only."""
+    largest = np.diag(gram) == np.diag(gram).max()
+    return gram * np.outer(largest, largest), slope * largest
 
 
 def _step(gram, slope, damping, least, most):
