@@ -218,6 +218,11 @@ class Division:
             span <= 1 or 2 * span * step <= self.blocks.shortest * len(self.blocks) / FOLDS)
 
     @property
+    def usual_lags(self):
+        """Samples that the longest filter remembers which is tried in any record."""
+        return _LENGTHS[_QUICK_LENGTHS - 1][1]
+
+    @property
     def words(self):
         """What is to be said where most of the motion is so short that a usual filter, for which
         the record is long enough, cannot be learnt and judged on different parts of it."""

@@ -19,6 +19,8 @@ _FEWEST = 32
 # Share of the power that a delay of whole samples may leave of what none does, to be worth it; and
 # so little that chance, which finds some lag in any record, does not do it.
 _WORTH, _FAR_LESS = 0.99, 0.5
+# Share of what is left that is most of it.
+_MOST = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,8 +94,8 @@ def left_by(reference, sensor, model=None, axis="x", noise_std=None, second_sens
     budget = division.of(residual, measured, simulated, other)
     noise = established_noise(residual, measured, pair.reference, used, pair.sampling_rate_hz,
                               pair.sensor_std, noise_std, other, division.period)
-    return Left(what, budget, noise, unaccounted(budget.rms, budget.output_rms, noise),
-                words + division.words)
+    words += division.words + _ringing(residual, budget, division)
+    return Left(what, budget, noise, unaccounted(budget.rms, budget.output_rms, noise), words)
 
 
 def _record(reference, sensor, axis):
@@ -164,6 +166,21 @@ def _surely_less(reference, at_once, late):
     less = Blocks.of(reference - reference.mean()).sums(at_once - late)
     by_chance = np.sqrt(2 * np.log(len(reference)))
     return less.sum() > by_chance * np.sqrt(len(less)) * np.std(less)
+
+
+def _ringing(residual, budget, division):
+    """Words where most of what is left counts as noise, and lies in a band that is narrower than
+    the filters which were tried resolve."""
+    power = np.abs(np.fft.rfft((residual - residual[division.used].mean()) * division.used))**2
+    lines = len(residual) / (2 * division.usual_lags)
+    peak = int(np.argmax(power))
+    near = power[max(int(peak - lines), 0):int(peak + lines) + 1].sum() / max(power.sum(), 1e-300)
+    if budget.share("noise") < _MOST or near < _MOST or peak < lines:
+        return []
+    hz = division.rate / len(residual)
+    return [f"{near:.0%} of what is left lies within {lines * hz:.2g} Hz of {peak * hz:.4g} Hz: "
+            f"an answer that rings there for longer than {division.usual_lags / division.rate:.2g} "
+            "s, the filters that were tried, counts as noise"]
 
 
 def _second(pair, samples, column):

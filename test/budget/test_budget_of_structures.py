@@ -79,3 +79,15 @@ def test_it_says_that_an_event_was_too_short_for_a_filter():
     assert words[0] == [] and "could be judged on other data" in words[1][0]
     left = of_arrays(steady * (0.01 + strong), 0.9 * steady * (0.01 + strong) + 0.01 * steady)
     assert words[1][0] in left.words
+
+
+def test_it_says_that_an_answer_rings_for_longer_than_a_filter():
+    rate, n = 1280.0, 4096
+    rng, time = np.random.default_rng(4), np.arange(n) / rate
+    strike = 1e-4 * rng.normal(size=n)
+    strike[:4] += [0.03, 0.07, 0.07, 0.01]
+    ring = np.exp(-1.2 * time) * np.sin(2 * np.pi * 212 * time) + 0.05 * rng.normal(size=n)
+    words = of_arrays(strike, ring, rate).words
+    assert any("within 6.7 Hz of 211.9 Hz: an answer that rings there for longer than 0.075 s" in w
+               for w in words)
+    assert not any("rings" in w for w in of_arrays(rng.normal(size=n), rng.normal(size=n)).words)
