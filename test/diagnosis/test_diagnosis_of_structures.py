@@ -54,3 +54,13 @@ def test_a_gain_that_no_motion_shows_does_not_end_at_exactly_none():
     problem = Problem(record, 0, frac_accel.SensorModel(Gain(1.0)), np.ones(4000, bool))
     fit = problem.fit({"sensitivity_error": known_effects()["sensitivity_error"](1.0)})
     assert 0 < abs(fit.effects["sensitivity_error"].gain) < 0.1 and np.std(fit.simulated) > 0
+
+
+def test_a_search_that_was_cut_still_gets_its_description():
+    rng = np.random.default_rng(0)
+    x = rng.normal(size=8000)
+    y = sig.lfilter(*sig.cheby1(5, 1, 0.3), x) + 0.01 * rng.normal(size=8000)
+    found = frac_accel.diagnose((x, y), frac_accel.SensorModel(Gain(1.0)), sampling_rate_hz=RATE,
+                                time_limit_s=1e-3)
+    assert "a fitted filter" in found.reason and "was cut" in found.cut_off
+    assert found.extended["nrmse"] < 0.03 and not found.findings
