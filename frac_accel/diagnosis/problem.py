@@ -418,6 +418,8 @@ class Problem:
             small = _SMALL_GAIN * here.cost / self.count
             needed = 2 * (here.cost - goal) / (left + 1 + to_come)
             here, there, damping = self._tried(here, damping, small, needed)
+            if there is None and not np.ptp(here.simulated):
+                there = self._set_in_motion(here)
             if there is None:
                 break
             gained = here.cost - there.cost
@@ -439,14 +441,9 @@ class Problem:
         be trusted, less than the `needed` one.
         """
         spared = len({*map(acts_on_spring, here.effects.values())}) > 1
-        # a gain of just none is no end: nothing else has a derivative there, or a size
-        is_still = not np.ptp(here.simulated)
-        small = 0.0 if is_still else small
         low, high = np.array([(u.low, u.high) for u in here.unknowns]).T
         for _ in range(_TRIES):
             gram, slope = _normal(here)
-            if is_still:
-                gram, slope = _of_largest(gram, slope)
             step = _step(gram, slope, damping, np.maximum(low - here.theta, -1.0),
                          np.minimum(high - here.theta, 1.0))
             promised = 2 * step @ slope - step @ gram @ step
@@ -470,6 +467,17 @@ class Problem:
                 break  # of no more use than one sample
             damping = max(10 * damping, 1e-3)
         return here, None, damping
+
+    def _set_in_motion(self, here):
+        """A fit whose gain is just none, beside which nothing else has a size or a derivative, one
+        step of the gain on; or None."""
+        gains = np.array([here.effects[unknown.cause].is_constant for unknown in here.unknowns])
+        gram, slope = _normal(here)
+        sizes = np.diag(gram)
+        theta = here.theta + np.where(gains & (sizes > 0), slope / np.maximum(sizes, 1e-300), 0.0)
+        point = self.point(self.replaced(here.effects, here.unknowns, theta), here.rough)
+        return dataclasses.replace(here, point=point, theta=theta) \
+            if point.cost < here.cost else None
 
     def point(self, effects, rough):
         """`Point` with these parameters; raises FracAccelError where the motion has no bound."""
@@ -656,13 +664,6 @@ def _from_theta(value, unknown):
 def _normal(fit):
     """Products of the derivatives among themselves and with the residual."""
     return fit.jacobian.T @ fit.jacobian, fit.jacobian.T @ fit.residual
-
-
-def _of_largest(gram, slope):
-    """The same of the unknown that changes the output most, alone: beside a gain of none the others
-    change what was before the record only."""
-    largest = np.diag(gram) == np.diag(gram).max()
-    return gram * np.outer(largest, largest), slope * largest
 
 
 def _step(gram, slope, damping, least, most):

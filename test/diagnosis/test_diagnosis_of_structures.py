@@ -1,10 +1,13 @@
 """Two places of one structure: the second is no sensor of the first, and nothing has a name."""
 
 import numpy as np
+import pytest
 import scipy.signal as sig
 
 import frac_accel
+from frac_accel.diagnosis.leftover import leftover
 from frac_accel.diagnosis.problem import Problem
+from frac_accel.diagnosis.search import Search
 from frac_accel.model.core import Gain
 from frac_accel.model.effects import known_effects
 from frac_accel.record import Record
@@ -54,6 +57,16 @@ def test_a_gain_that_no_motion_shows_does_not_end_at_exactly_none():
     problem = Problem(record, 0, frac_accel.SensorModel(Gain(1.0)), np.ones(4000, bool))
     fit = problem.fit({"sensitivity_error": known_effects()["sensitivity_error"](1.0)})
     assert 0 < abs(fit.effects["sensitivity_error"].gain) < 0.1 and np.std(fit.simulated) > 0
+
+
+def test_a_fit_that_ended_at_a_gain_of_none_has_a_scale_and_is_followed_by_nothing():
+    """As where the time limit ends it there."""
+    x, y = np.random.default_rng(0).normal(size=(2, 4000))
+    record = Record.of(*pair_of((x, y), RATE, "x", "", ""), "x", None)
+    problem = Problem(record, 0, frac_accel.SensorModel(Gain(1.0)), np.ones(4000, bool))
+    fit = problem.fit({"sensitivity_error": known_effects()["sensitivity_error"](0.0)}, 0)
+    assert Search(problem).view(fit).level == pytest.approx(np.std(problem.measured))
+    assert leftover(fit.residual, fit.simulated, problem.used).share == 0
 
 
 def test_a_search_that_was_cut_still_gets_its_description():
