@@ -475,7 +475,10 @@ class Problem:
         gram, slope = _normal(here)
         sizes = np.diag(gram)
         theta = here.theta + np.where(gains & (sizes > 0), slope / np.maximum(sizes, 1e-300), 0.0)
-        point = self.point(self.replaced(here.effects, here.unknowns, theta), here.rough)
+        try:
+            point = self.point(self.replaced(here.effects, here.unknowns, theta), here.rough)
+        except FracAccelError:
+            return None
         return dataclasses.replace(here, point=point, theta=theta) \
             if point.cost < here.cost else None
 

@@ -76,3 +76,12 @@ def test_a_search_that_was_cut_still_gets_its_description():
                                 time_limit_s=1e-3)
     assert "a fitted filter" in found.reason and "was cut" in found.cut_off
     assert found.extended["nrmse"] < 0.03 and not found.findings
+
+
+def test_it_says_that_an_event_was_too_short_for_a_filter():
+    rng = np.random.default_rng(3)
+    x = rng.normal(size=6000) * (0.01 + np.exp(-((np.arange(6000) - 3000) / 60.0)**2))
+    found = frac_accel.diagnose((x, 0.9 * x + 0.01 * rng.normal(size=6000)),
+                                frac_accel.SensorModel(Gain(1.0)), sampling_rate_hz=RATE,
+                                time_limit_s=1e-3)
+    assert any("could be judged on other data" in words for words in found.integrity.words)
