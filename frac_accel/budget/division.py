@@ -217,6 +217,24 @@ class Division:
         return coefficients * _SAMPLES * step <= self.used.sum() and (
             span <= 1 or 2 * span * step <= self.blocks.shortest * len(self.blocks) / FOLDS)
 
+    @property
+    def usual_lags(self):
+        """Samples that the longest filter remembers which is tried in any record."""
+        return _LENGTHS[_QUICK_LENGTHS - 1][1]
+
+    @property
+    def words(self):
+        """What is to be said where most of the motion is so short that a usual filter, for which
+        the record is long enough, cannot be learnt and judged on different parts of it."""
+        size, span = _span(_LENGTHS[_QUICK_LENGTHS - 1])
+        if not self.moves or self.fits(size, span, 1) or not self.fits(size, 1, 1):
+            return []
+        longest = max((length[1] for length in _LENGTHS if self.fits(*_span(length), 1)),
+                      default=0)
+        return ["most of the motion lies in so short a time that no filter which remembers more "
+                f"than {longest / self.rate:.2g} s could be judged on other data: what a longer "
+                "one would take counts as noise"]
+
     def filters(self, key, make):
         """Filters of the reference, kept for the next budget."""
         if key not in self._filters:
@@ -390,8 +408,9 @@ class _One:
         return self.r.blocks.sums((2 * target - predicted) * predicted)
 
     def _shaped(self, values):
-        """Values without what is slower than the motion, or where faster motion may fold."""
-        lines = rfft(values)
+        """Values without what is slower than the motion or resembles a drift, or where faster
+        motion may fold."""
+        lines = rfft(memory.without_drift(values))
         lines[:int(self.r.lowest * self.r.n)] = 0.0
         lines[int(BAND * self.r.n):] = 0.0
         return irfft(lines, self.r.n)

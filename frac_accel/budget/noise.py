@@ -3,6 +3,7 @@
 import dataclasses
 
 import numpy as np
+from scipy.signal import detrend
 from scipy.stats import spearmanr
 
 from ..identification.response.recognise import recognise
@@ -11,7 +12,7 @@ from ..identification.response.recognise import recognise
 _AT_REST = 0.01
 _REST_S = 0.5
 _REST_SAMPLES = 200
-# Factor by which a covariance may differ from the scatter at rest.
+# Factor by which a covariance may differ from the scatter at rest, and that from its usual part's.
 _FAR = 2.0
 # Ratio of the motion in loud and quiet stretches that is needed to tell noise from what follows the
 # motion, the ratio of what is left from which it does, and the chance of as high a correlation of
@@ -20,6 +21,8 @@ _DIFFER = 2.0
 _FOLLOWS = 1.2
 _P_VALUE = 0.1
 _STRETCHES = 20
+# Parts of a stretch at rest, which noise fills evenly.
+_REST_PARTS = 10
 # Of the stretches at rest, the one whose scatter counts.
 _QUIETEST = 0.25
 # Share of the power at rest within so many lines of one above the lowest ones that is no noise: a
@@ -180,7 +183,7 @@ def _rest(measured, reference, used, rate):
         part = reference[rows] - reference[rows].mean(axis=0)
         if np.sqrt(np.sum(part**2) / length) < _AT_REST * whole:
             values = measured[rows] - line @ (line.T @ measured[rows])
-            found.append(np.sqrt(values @ values / (length - 2)))
+            found.append(_steady(values))
             power = power + np.abs(np.fft.rfft(values * np.hanning(length)))**2
     if not found:
         return None, None
@@ -193,6 +196,16 @@ def _rest(measured, reference, used, rate):
     if step and scatter < step / np.sqrt(12):
         scatter = float(step / np.sqrt(12))
     return (scatter if scatter > 0 else None), None
+
+
+def _steady(values):
+    """Scatter of values about a line; where a short part has most of it, such as the end of a
+    motion, which also bends the line, the usual one of the parts about lines of their own."""
+    scatter = float(np.sqrt(values @ values / (len(values) - 2)))
+    parts = values[:len(values) // _REST_PARTS * _REST_PARTS].reshape(_REST_PARTS, -1)
+    usual = np.sqrt(np.median(np.mean(parts**2, axis=1)))
+    return scatter if scatter < _FAR * usual else \
+        float(np.sqrt(np.median(np.var(detrend(parts, axis=1), axis=1, ddof=2))))
 
 
 def _lattice(values):

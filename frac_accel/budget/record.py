@@ -11,10 +11,16 @@ from ..model.effects.fit_starts import bulk_shift
 from ..record import Record
 from ..record.clock import usable
 from ..simulation import simulate
+from .blocks import Blocks
 from .division import Division
 from .noise import established_noise, unaccounted
 
 _FEWEST = 32
+# Share of the power that a delay of whole samples may leave of what none does, to be worth it; and
+# so little that chance, which finds some lag in any record, does not do it.
+_WORTH, _FAR_LESS = 0.99, 0.5
+# Share of what is left that is most of it.
+_MOST = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -88,6 +94,7 @@ def left_by(reference, sensor, model=None, axis="x", noise_std=None, second_sens
     budget = division.of(residual, measured, simulated, other)
     noise = established_noise(residual, measured, pair.reference, used, pair.sampling_rate_hz,
                               pair.sensor_std, noise_std, other, division.period)
+    words += division.words + _ringing(residual, budget, division)
     return Left(what, budget, noise, unaccounted(budget.rms, budget.output_rms, noise), words)
 
 
@@ -130,24 +137,50 @@ def _between(values, place):
 
 def _static(reference, measured, used):
     """Reference times the gain that fits best, with an offset, maybe whole samples of delay."""
-    best = None
     shift = bulk_shift(reference, measured, used) if np.ptp(reference[used]) else 0
-    if abs(shift) > len(reference) // 4:
-        shift = 0
-    for samples in dict.fromkeys((0, int(shift))):
-        moved = np.roll(reference, samples)
-        if samples > 0:
-            moved[:samples] = reference[0]
-        elif samples < 0:
-            moved[samples:] = reference[-1]
-        x, y = moved - moved[used].mean(), measured - measured[used].mean()
-        power = float(x[used] @ x[used])
-        gain = float(x[used] @ y[used]) / power if power else 0.0
-        left = float(np.sum((y - gain * x)[used]**2))
-        # a shift must be worth it
-        if best is None or left < 0.99 * best[0]:
-            best = left, gain * moved + (measured - gain * moved)[used].mean(), gain, samples
-    return best[1:]
+    fits = [_moved(reference, measured, used, samples)
+            for samples in dict.fromkeys((0, int(shift)))]
+    at_once, late = (np.where(used, (measured - fit[0])**2, 0.0) for fit in (fits[0], fits[-1]))
+    worth_it = late.sum() < _FAR_LESS * at_once.sum() or (
+        late.sum() < _WORTH * at_once.sum() and _surely_less(reference, at_once, late))
+    return fits[-1] if worth_it else fits[0]
+
+
+def _moved(reference, measured, used, samples):
+    """Reference, whole samples later, times the gain that fits best, with an offset; the gain, and
+    the samples."""
+    moved = np.roll(reference, samples)
+    if samples > 0:
+        moved[:samples] = reference[0]
+    elif samples < 0:
+        moved[samples:] = reference[-1]
+    x, y = moved - moved[used].mean(), measured - measured[used].mean()
+    power = float(x[used] @ x[used])
+    gain = float(x[used] @ y[used]) / power if power else 0.0
+    return gain * moved + (measured - gain * moved)[used].mean(), gain, samples
+
+
+def _surely_less(reference, at_once, late):
+    """Whether a delay leaves less power all along the record, beyond what the best of so many lags
+    does by chance: a narrow band agrees a period away as well, and what is unrelated somewhere."""
+    less = Blocks.of(reference - reference.mean()).sums(at_once - late)
+    by_chance = np.sqrt(2 * np.log(len(reference)))
+    return less.sum() > by_chance * np.sqrt(len(less)) * np.std(less)
+
+
+def _ringing(residual, budget, division):
+    """Words where most of what is left counts as noise, and lies in a band that is narrower than
+    the filters which were tried resolve."""
+    power = np.abs(np.fft.rfft((residual - residual[division.used].mean()) * division.used))**2
+    lines = len(residual) / (2 * division.usual_lags)
+    peak = int(np.argmax(power))
+    near = power[max(int(peak - lines), 0):int(peak + lines) + 1].sum() / max(power.sum(), 1e-300)
+    if budget.share("noise") < _MOST or near < _MOST or peak < lines:
+        return []
+    hz = division.rate / len(residual)
+    return [f"{near:.0%} of what is left lies within {lines * hz:.2g} Hz of {peak * hz:.4g} Hz: "
+            f"an answer that rings there for longer than {division.usual_lags / division.rate:.2g} "
+            "s, the filters that were tried, counts as noise"]
 
 
 def _second(pair, samples, column):

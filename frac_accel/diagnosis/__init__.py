@@ -154,7 +154,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
             in_own_core=[cause for cause, entry in loose.items()
                          if seed is not None and entry.effect.restates_core])
     begin = engine_of(model, stds, seed)
-    engine, stray = _without_spikes(begin, used, stray, record.reference[:, column])
+    engine, stray = _without_spikes(begin, used, stray, record.reference[:, column], found.step)
     if stray.any():
         found.words.append(spikes_words(stray.sum()))
     engine.spikes, engine.aside = stray, stray | (record.valid & ~moving)
@@ -247,14 +247,14 @@ def _inverts(own):
     return own.core.sensitivity < 0 if isinstance(own.core, (Gain, Oscillator)) else False
 
 
-def _without_spikes(engine, used, stray, reference):
+def _without_spikes(engine, used, stray, reference, step):
     """Engine whose fits leave out what stands out of the residual, too; and all that they do."""
     first = engine(used=used)
     # where samples do not count the residual is 0, and steps at their edges are no spikes
     p = first.problem
     inside = binary_erosion(p.used, iterations=_EDGE)
     more = p.put_back(inside & spikes(first.search.baseline.residual,
-                                      p.taken(reference)), np.zeros(len(used), bool))
+                                      p.taken(reference), step), np.zeros(len(used), bool))
     return (engine(used=used & ~more) if more.any() else first), stray | more
 
 
@@ -372,7 +372,7 @@ def _shown(found, record, column, used):
     effects = {cause: effect.of_record(found, measured)
                for cause, effect in known_effects().items() if effect.read_off}
     effects = {cause: effect for cause, effect in effects.items() if effect is not None}
-    stray = used & spikes(measured, record.reference[:, column])
+    stray = used & spikes(measured, record.reference[:, column], found.step)
     silent = np.zeros(len(used), bool)
     for effect in effects.values():
         silent |= record.instants_of(effect.spoiled, column)

@@ -487,7 +487,7 @@ def _end_of_band_hz(problem):
     return problem.record.band_hz or problem.rate / 2
 
 
-def _own_delay_s(core):
+def own_delay_s(core):
     """Delay [s] of slow motion in an oscillator, 2 zeta / omega_0."""
     return core.damping_ratio / (np.pi * core.natural_frequency_hz)
 
@@ -638,7 +638,7 @@ def within_own_delay(engine, best, effect):
     if not delay or effect.of_reference or not isinstance(core, Oscillator) \
             or not _core_is_identified(engine):
         return ""
-    own = _own_delay_s(core)
+    own = own_delay_s(core)
     if 0 > delay >= -_TAKEN_BACK * own:
         return (f"a lead of {-delay:.3g} s beside a resonance whose own delay is {own:.3g} s: a "
                 "soft mount resonates alike and does not delay")
@@ -655,7 +655,7 @@ def delay_of_unseen_core(engine, best):
     if not isinstance(core, Oscillator) or not _core_is_identified(engine) \
             or core.natural_frequency_hz < _end_of_band_hz(p):
         return 0.0
-    return _own_delay_s(core)
+    return own_delay_s(core)
 
 
 def _acausal(engine, best, stds):

@@ -347,6 +347,11 @@ class Engine:
         return Division(p.record.reference[self._parted], p.record.valid[self._parted], p.rate,
                         p.axis, quick=True)
 
+    @property
+    def words_of_budget(self):
+        """What the budget cannot tell of this record, in words."""
+        return self._division.words
+
     def established_noise(self, fitted, stated_std=None):
         """`EstablishedNoise` of the record, beside a fit."""
         p = self.problem

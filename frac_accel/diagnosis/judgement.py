@@ -10,6 +10,7 @@ from scipy.special import expit
 from ..errors import FracAccelError
 from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel, is_link
+from ..model.core import Oscillator
 from ..model.effects import IDENTIFIED, effect_of, known_effects
 from ..model.effects.base import OFFSET
 from . import courses
@@ -18,6 +19,7 @@ from .doubts import (
     delay_of_unseen_core,
     doubts_about,
     left_open,
+    own_delay_s,
     resembles,
     within_own_delay,
 )
@@ -32,6 +34,7 @@ from .own_core import in_own_core
 from .read_off import read_off
 from .words import (
     AS_NOISE,
+    ahead_words,
     description_words,
     gain_words,
     hidden_words,
@@ -343,8 +346,8 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     rest = engine.budget(fitted, at_limit) if output is None else \
         engine.budget_between(p.measured, output, p.record.valid)
     findings = [_beside_unseen_core(f, delay_of_unseen_core(engine, fitted)) for f in findings]
-    if noise.rms is None:
-        found.words.extend(words for words in noise.words if words not in found.words)
+    more = [*engine.words_of_budget, *(noise.words if noise.rms is None else ())]
+    found.words.extend(words for words in more if words not in found.words)
     if p.in_own_core:
         model, findings = in_own_core(model, findings, p.in_own_core, AXES[p.axis])
     return Diagnosis(
@@ -353,7 +356,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
         + description_words([] if kept else [*described.values()], unnamed,
                             sorted(kept.keys() - fitted.causes), after / spread)
         + hint_words(hint if plain and not strange else 0.0)
-        + hidden_words(account.own, account.error) + late,
+        + hidden_words(account.own, account.error) + late + _ahead(p, effects, named),
         {"rmse": account.before, "nrmse": account.before / spread,
          "noise_rms": floor or left.noise_rms},
         findings, _once_each(suspects),
@@ -578,7 +581,9 @@ def _described(engine, fitted, after, parts):
                 p.measured, output, p.used, rest, p.rate)),
             ({"even", "odd"}, "a fitted curve", lambda output: fit_empirical_map(
                 p.measured, output, p.used, rest))):
-        if not belongs & parts or p.limit.ends_judging("no description was fitted to what is left"):
+        # whatever the time limit: it takes a fraction of a second, and a search that was cut needs
+        # it most
+        if not belongs & parts:
             continue
         try:
             found = fit(output)
@@ -632,6 +637,19 @@ def _of_reference(engine, effects, named):
             words += f"; what the sensor shows too early stands in the model as {cls.cause}, so " \
                 "that nothing is taken out of its stamps"
     return effects, words
+
+
+def _ahead(problem, effects, named):
+    """Words where a model, by a lead that nothing names, answers before the reference moves though
+    no stamp shows that to be late."""
+    delays = {cause: effect.pure_delay_s() for cause, effect in effects.items()
+              if not effect.of_reference}
+    if problem.record.is_reference_late or not any(
+            delay < 0 and cause not in named for cause, delay in delays.items()):
+        return ""
+    core = problem.axis_model(effects).effective_core
+    own = own_delay_s(core) if isinstance(core, Oscillator) else 0.0
+    return ahead_words(problem.record.lag_s - sum(delays.values()) - own, problem.rate)
 
 
 def _extended(engine, effects, stated):

@@ -125,6 +125,8 @@ def rounding_errors(residual, simulated, used, step):
 def _leftover(residual, simulated, used, across):
     rng = np.random.default_rng(0)
     rms = float(np.sqrt(np.mean(residual[used]**2)))
+    if not np.ptp(simulated):
+        return Leftover(rms, 0.0, 0.0, 0.0, 0.0)  # nothing follows a motion that is none
     below = _below_folding(residual) * used
     kept = float(np.mean(below[used]**2)) / max(rms, 1e-300)**2
     linear, linear_score = max((_linear(residual, signal, rng) for signal in

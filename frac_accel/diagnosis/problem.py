@@ -422,6 +422,8 @@ class Problem:
             small = _SMALL_GAIN * here.cost / self.count
             needed = 2 * (here.cost - goal) / (left + 1 + to_come)
             here, there, damping = self._tried(here, damping, small, needed)
+            if there is None and not np.ptp(here.simulated):
+                there = self._set_in_motion(here)
             if there is None:
                 break
             gained = here.cost - there.cost
@@ -469,6 +471,20 @@ class Problem:
                 break  # of no more use than one sample
             damping = max(10 * damping, 1e-3)
         return here, None, damping
+
+    def _set_in_motion(self, here):
+        """A fit whose gain is just none, beside which nothing else has a size or a derivative, one
+        step of the gain on; or None."""
+        gains = np.array([here.effects[unknown.cause].is_constant for unknown in here.unknowns])
+        gram, slope = _normal(here)
+        sizes = np.diag(gram)
+        theta = here.theta + np.where(gains & (sizes > 0), slope / np.maximum(sizes, 1e-300), 0.0)
+        try:
+            point = self.point(self.replaced(here.effects, here.unknowns, theta), here.rough)
+        except FracAccelError:
+            return None
+        return dataclasses.replace(here, point=point, theta=theta) \
+            if point.cost < here.cost else None
 
     def point(self, effects, rough):
         """`Point` with these parameters; raises FracAccelError where the motion has no bound."""

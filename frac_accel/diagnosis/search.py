@@ -267,7 +267,8 @@ class Search:
         return View(p.rate, p.time, p.measured, fitted.simulated, fitted.residual, p.used,
                     model.effective_core, p.record.since_start_s,
                     sum(e.delay_s for e in model.effects if e.cause == delay),
-                    float(np.std(fitted.simulated[p.used])),
+                    # a gain of none leaves no motion that has a level
+                    float(np.std(fitted.simulated[p.used])) or p.scales.level,
                     celsius is not None and np.ptp(celsius) > 0.1,
                     p.excited,
                     "xyz"[p.axis],

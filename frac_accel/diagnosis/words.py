@@ -15,6 +15,8 @@ _MOSTLY_NOISE = 0.3
 _SHOWN = 1e-4
 # Share of an error by which the reference's own noise is worth a word.
 _HIDDEN = 0.1
+# Sampling intervals by which no sensor is earlier than what moves it.
+_EARLY = 2.0
 
 
 def is_accounted(rmse, spread, noise):
@@ -96,6 +98,13 @@ def hidden_words(own, error):
     """Words for what the reference's own noise (RMS) makes of an error (RMS)."""
     return (f"; {min(own / error, 1.0)**2:.0%} of that power is what the reference's own noise "
             "hides") if own > _HIDDEN * error else ""
+
+
+def ahead_words(lead_s, rate):
+    """Words for a model that answers so long before the reference moves."""
+    return (f"; it answers {lead_s:.2g} s before the reference moves, which no sensor does: the "
+            "reference is late, or the sensor is not moved by what the reference shows, as at "
+            "another place of a structure") if lead_s > _EARLY / rate else ""
 
 
 def _unknown(noise):
