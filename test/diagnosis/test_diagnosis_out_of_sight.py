@@ -1,4 +1,4 @@
-"""What lies beyond all that is compared, or hides in a fit: it must not lend its doings to a name."""
+"""What lies beyond all that is compared, or hides in a fit, must not lend its doings to a name."""
 
 import numpy as np
 import pytest
