@@ -13,13 +13,14 @@ _SCATTER = 0.3
 _RARE = 1e-3
 _NEIGHBOURS = 15
 # Price of a gap in the count of lost samples, and most that one sample's stamp may cost [variances
-# of the scatter].
+# of the scatter]; samples by which the count may differ from that by the neighbours' median.
 _GAP, _OUTLIER = 10.0, 25.0
+_AWAY = 16
 _FIRST_PART = 64
 # Length of the mean of stamps on the circle of an interval from which there are instants: 0
 # without, 0.3 where they scatter by a quarter of it.
 _TOGETHER = 0.2
-# Stamps to which a rate is tuned first, and how far it may be off.
+# Intervals to which a rate is tuned first, and how far it may be off.
 _TUNED, _DETUNED = 256, 0.15
 # Scatter [intervals] of stamps that are as regular as clocks make them, and of those that look
 # wrongly counted (0.29: as likely here as there).
@@ -219,32 +220,39 @@ def slots_of(place):
     together = np.abs(np.mean(np.exp(2j * np.pi * place)))
     if together < max(_TOGETHER, 4 / np.sqrt(len(place))):
         edges = edges[:0]  # the rate is another one, or there is none
+    scatter = max(_deviation(off), 1e-3)
+    counted = lost.copy()
     for start, stop in zip(edges[::2], edges[1::2]):
-        first, last = lost[start - 1], lost[stop]
-        if last > first:
-            lost[start:stop] = first + _likeliest_losses(
-                ahead[start:stop] - first, int(last - first), max(_deviation(off), 1e-3))
-    return np.arange(len(place)) + lost
+        if lost[stop] > lost[start - 1]:
+            counted[start:stop] = _likeliest_losses(
+                ahead[start:stop], lost[start:stop], (lost[start - 1], lost[stop]), scatter)
+    return np.arange(len(place)) + counted
 
 
-def _likeliest_losses(ahead, most, scatter):
-    """How much is lost before each sample: whole numbers from 0 to `most` that never fall.
+def _likeliest_losses(ahead, about, ends, scatter):
+    """How much is lost before each sample: whole numbers near others, `about`, that never fall.
 
-    They leave the least of what the stamps are ahead [intervals] of the count of samples, beside a
-    price for each gap (dynamic programming: the Viterbi algorithm).
+    From the first of the `ends` to the second, they leave the least of what the stamps are `ahead`
+    [intervals] of the count of samples, beside a price for each gap (dynamic programming: the
+    Viterbi algorithm).
     """
-    levels = np.arange(most + 1)
+    near = np.arange(-_AWAY, _AWAY + 1)
+    levels = about[:, None] + near
     price = np.minimum(((ahead[:, None] - levels) / scatter)**2, _OUTLIER)
-    total, came = price[0] + _GAP * (levels > 0), []
-    for row in price[1:]:
-        lower = np.r_[np.inf, np.minimum.accumulate(total)[:-1]] + _GAP
-        best = np.maximum.accumulate(np.where(total == np.minimum.accumulate(total), levels, 0))
-        came.append(np.where(lower < total, np.r_[0, best[:-1]], levels))
-        total = np.minimum(lower, total) + row
-    place = [int(np.argmin(total + _GAP * (levels < most)))]
+    price[(levels < ends[0]) | (levels > ends[1])] = np.inf
+    total, came, place = price[0] + _GAP * (levels[0] > ends[0]), [], near + _AWAY
+    for row, rise in zip(price[1:], np.diff(about).astype(int)):
+        least = np.minimum.accumulate(total)
+        where = np.maximum.accumulate(np.where(total == least, place, 0))
+        below = np.minimum(place + rise, len(near)) - 1
+        lower = np.where(below >= 0, least[below], np.inf) + _GAP
+        same = np.append(total[rise:], np.full(min(rise, len(near)), np.inf))
+        came.append(np.where(lower < same, where[below], place + rise))
+        total = np.minimum(lower, same) + row
+    best = [int(np.argmin(total + _GAP * (levels[-1] < ends[1])))]
     for step in reversed(came):
-        place.append(int(step[place[-1]]))
-    return np.array(place[::-1], float)
+        best.append(int(step[best[-1]]))
+    return levels[np.arange(len(levels)), best[::-1]]
 
 
 def long_term_rate(stamps):
@@ -279,19 +287,19 @@ def _tuned(seconds, interval):
     many are lost: the highest peak of the stamps' spectrum near that of another interval
     (Rayleigh's statistic; K. V. Mardia, P. E. Jupp, *Directional Statistics* (2000), section 6.3).
     """
-    length, low, high = _TUNED, (1 - _DETUNED) / interval, (1 + _DETUNED) / interval
+    span, low, high = _TUNED * interval, (1 - _DETUNED) / interval, (1 + _DETUNED) / interval
     while True:
-        part = seconds[:length]
-        tried = np.arange(low, high, 0.25 / part[-1])
+        part = seconds[seconds <= span]
+        tried = np.arange(low, high, 0.25 / span)
         sums = np.array([np.mean(np.exp(2j * np.pi * rate * part)) for rate in tried])
         best = int(np.argmax(np.abs(sums)))
-        if length >= len(seconds):
+        if span >= seconds[-1]:
             place = seconds * tried[best] - np.angle(sums[best]) / (2 * np.pi)
             line = _line(np.round(place), seconds)
             place = (seconds - line[1]) / line[0]
             return np.std(place - np.round(place)), line[0], place
-        low, high = tried[best] + np.array([-0.5, 0.5]) / part[-1]
-        length *= 4
+        low, high = tried[best] + np.array([-0.5, 0.5]) / span
+        span = min(4 * span, seconds[-1])
 
 
 def _grown(seconds, slots):
