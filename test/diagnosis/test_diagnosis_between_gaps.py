@@ -68,4 +68,4 @@ def test_instants_that_scatter_are_found_where_the_reference_is_faster(seed):
     assert [finding.cause for finding in found.findings] == ["sampling_jitter"]
     value, std = found.findings[0].effect.rms_s, found.findings[0].std["rms_s"]
     # of the drawn ones, which scatter by themselves
-    assert abs(value / scatter - 1) < 0.03 and std < 0.02 * scatter
+    assert abs(value / scatter - 1) < 0.02 and std < 0.02 * scatter

@@ -57,8 +57,11 @@ def follows(error, variance, measure):
 
 
 def slope_of(values):
-    """Derivative by the sample's number, shape (n,); central differences on four times as many
-    points."""
+    """Derivative by the sample's number, shape (n,).
+
+    Central differences of fourth order on four times as many points: 0.5 % too small at 0.8 of the
+    Nyquist frequency.
+    """
     from scipy.signal import resample_poly
-    fine = resample_poly(values, 4, 1)
-    return 4 * np.gradient(fine)[::4]
+    fine = np.pad(resample_poly(values, 4, 1), 2, mode="edge")
+    return (8 * (fine[3:-1] - fine[1:-3]) - (fine[4:] - fine[:-4]))[::4] / 3
