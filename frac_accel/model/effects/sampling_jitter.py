@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-from scipy.signal import oaconvolve
 
 from ..parameters import parameter
 from .base import STAMPS, Effect, Reading
@@ -41,6 +40,7 @@ class SamplingJitter(Effect):
     @classmethod
     def recognised(cls, seen, shown):
         """The residual's power is noise and J**2 times the slope's, sample by sample."""
+        from scipy.signal import oaconvolve  # here, as the corrector needs nothing of it
         around = seen.of_one_error
         if seen.found.jitter_rms_s or around is None:
             return None  # stamps that scatter do the same, and so do values between samples
