@@ -508,13 +508,18 @@ def _at_the_edge(engine, best):
 
 
 def _out_of_sight(engine, best):
-    """Filters of the sensor without a peak whose corners lie beyond all that is compared."""
-    edge = _end_of_band_hz(engine.problem)
-    return {cause: f"its corner, {lowest:.3g} Hz, lies beyond what is compared ({edge:.3g} Hz): "
-                   "there many filters do the same"
-            for cause, effect in _filters(engine, best).items()
-            if is_link(effect) and not effect.of_reference and _damping(effect) > _RINGS
-            and (lowest := np.abs(effect.poles()).min() / (2 * np.pi)) > edge}
+    """Filters without a peak, of the sensor or of the reference, whose corners lie beyond all that
+    is compared, beside a model that nobody has stated: its core may be another one there."""
+    edge, found = _end_of_band_hz(engine.problem), {}
+    if all(entry.is_known for entry in engine.loose.values()):
+        return {}
+    for cause, effect in _filters(engine, best).items():
+        corners = np.abs(np.r_[effect.poles(), effect.zeros()]) / (2 * np.pi) \
+            if is_link(effect) and not 0 < _damping(effect) <= _RINGS else np.zeros(0)
+        if len(corners) and corners.min() > edge:
+            found[cause] = f"its corner, {corners.min():.3g} Hz, lies beyond what is compared " \
+                           f"({edge:.3g} Hz): there many filters, and cores, do the same"
+    return found
 
 
 def _hardly_rings(engine, best):
@@ -522,7 +527,7 @@ def _hardly_rings(engine, best):
     return {cause: f"it hardly rings (damping ratio {damping:.2g}): a part that swings by itself "
                    "rings longer, and filters do the same"
             for cause, effect in _filters(engine, best).items()
-            if is_link(effect) and np.size(effect.zeros()) == np.size(effect.poles()) > 0
+            if is_link(effect) and np.size(effect.zeros()) == np.size(effect.poles()) > 1
             and (damping := _damping(effect)) > _RINGS}
 
 
