@@ -299,11 +299,11 @@ def _stands_out_at_its_peak(engine, best, cause, taken):
     """Whether a lightly damped link takes far more than all that is left around its resonance:
     whatever filter is missing elsewhere, this peak is there."""
     effect, p = best.effects[cause], engine.problem
-    poles = np.atleast_1d(effect.poles()) if is_link(effect) else np.zeros(0)
-    if not len(poles) or np.any(-poles.real > _PEAKED * np.abs(poles)) or not np.all(poles.imag):
+    if not is_link(effect) or not 0 < _damping(effect) <= _PEAKED:
         return False
     frequency = np.fft.rfftfreq(len(p.used), 1 / p.rate)
-    apart = np.abs(np.log2(np.maximum(frequency, 1e-300) * 2 * np.pi / np.abs(poles).min()))
+    apart = np.abs(np.log2(np.maximum(frequency, 1e-300) * 2 * np.pi
+                           / np.abs(effect.poles()).min()))
     spectrum = np.fft.rfft(best.residual * p.used)
     there = np.fft.irfft(np.where(apart < 0.5, spectrum, 0.0), len(p.used))
     return taken > _AT_PEAK * engine.rms(there)
@@ -532,9 +532,10 @@ def _hardly_rings(engine, best):
 
 
 def _damping(effect):
-    """Largest damping ratio of a link's poles; 1 where one is real."""
+    """Largest damping ratio of a link's poles: 1 of a real one; 0 without any."""
     poles = np.atleast_1d(effect.poles())
-    return float(np.max(-poles.real / np.abs(poles), initial=0.0))
+    ratios = np.where(poles.imag == 0, 1.0, -poles.real / np.maximum(np.abs(poles), 1e-300))
+    return float(np.max(ratios, initial=0.0))
 
 
 def _on_both_sides(engine, best):
