@@ -617,9 +617,9 @@ class _One:
         return np.array(found[:_MODULATIONS])
 
     def _slow_candidates(self, target):
-        for count, values in enumerate(unrelated.slow_candidates(
+        for place, (count, values) in enumerate(unrelated.slow_candidates(
                 target, self.counted, self.r.lowest, target)):
-            yield count, unrelated.FEWEST * 2**count, lambda values=values: values
+            yield place, count, lambda values=values: values
 
     def _distortion_candidates(self, target):
         r = self.r

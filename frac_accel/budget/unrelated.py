@@ -249,17 +249,18 @@ def slow_candidates(target, used, lowest, floor_values):
 
     Yields
     ------
-    ndarray, shape (n,)
+    (int, ndarray of shape (n,))
+        Number of stretches, and the prediction.
     """
     n = len(target)
     time = _correlation_time(floor_values, used)
-    counts = [FEWEST, 2 * FEWEST, _STRETCHES]
-    for count in counts:
+    for count in (FEWEST, 2 * FEWEST, _STRETCHES):
         if n / count < max(_TIMES * time, 16) or (count > FEWEST and count / n > 2 * lowest):
             if count == FEWEST and n / count >= 4:
-                yield _from_neighbours(target, used, FEWEST)
+                yield count, _from_neighbours(target, used, count, _level)
             return
-        yield _from_neighbours(target, used, count)
+        for law in (_level, _curve):
+            yield count, _from_neighbours(target, used, count, law)
 
 
 def _correlation_time(values, used):
@@ -279,8 +280,8 @@ def _correlation_time(values, used):
     return float(np.sum(alike[:ended[0] if len(ended) else len(alike)]))
 
 
-def _from_neighbours(target, used, count):
-    """Each stretch's mean by the straight line between those of its neighbours."""
+def _from_neighbours(target, used, count, law):
+    """Each stretch from the means of its neighbours, by a law of these and their places."""
     n = len(target)
     edges = np.linspace(0, n, count + 1).astype(int)
     # what lies next to a stretch resembles it by chance
@@ -297,5 +298,17 @@ def _from_neighbours(target, used, count):
         others = known.copy()
         others[i] = False
         if others.any():
-            result[start:stop] = np.interp(centres[i], centres[others], means[others])
+            place = (np.arange(start, stop) - centres[i]) / n
+            result[start:stop] = law(place, (centres[others] - centres[i]) / n, means[others])
     return result
+
+
+def _level(place, centres, means):
+    """The straight line between the neighbours, in the middle."""
+    return np.interp(0.0, centres, means)
+
+
+def _curve(place, centres, means):
+    """A parabola through the four next ones, everywhere."""
+    near = np.argsort(np.abs(centres), kind="stable")[:4]
+    return np.polyval(np.polyfit(centres[near], means[near], min(2, len(near) - 1)), place)

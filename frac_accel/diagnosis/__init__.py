@@ -11,7 +11,7 @@ from scipy.ndimage import binary_erosion
 from ..budget.reference_noise import reference_noise
 from ..errors import FracAccelError, IdentificationError
 from ..identification.checks.clipped import clipped_sensor
-from ..identification.checks.record_checks import moving_samples
+from ..identification.checks.record_checks import moving_samples, unclipped_reference
 from ..identification.response.excitation import held_out, require_excitation
 from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC
 from ..model import AXES, SensorModel
@@ -56,6 +56,9 @@ _FOLLOWS = 0.5
 _TRIED = 4
 # Filters of which the best stands beside a course while that is found.
 _FILTERS = 3
+# Share of the record in which the reference may be clipped: what is found is judged, and what it
+# leaves there shows.
+_CLIPPED_REFERENCE = 0.02
 # Parameters of a classical core.
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
@@ -125,7 +128,11 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if len(record) < _FEWEST:
         return insufficient(f"only {len(record)} samples; {_FEWEST} needed", model, found)
     moving, notes = moving_samples(record, column)
-    found.words.extend(notes)
+    unclipped, more = unclipped_reference(record, column, moving, _CLIPPED_REFERENCE)
+    # what moved there nobody knows: no budget parts it either
+    record = dataclasses.replace(record, valid=record.valid & (unclipped | ~moving))
+    moving = unclipped
+    found.words.extend([*notes, *more])
     used = record.valid & moving
     found = _with_limits(found, record, column, used)
     noise = reference_noise(record, column, used, _stated_noise(source[0], column),

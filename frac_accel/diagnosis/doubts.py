@@ -10,6 +10,7 @@ from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.core import Oscillator
 from ..model.effects.base import CROSS_AXIS, OFFSET, Effect
 from .engine import LONG, WEIGHS
+from .gradual import gradual
 from .names import cancelling, undetermined
 from .problem import Problem, acts_on_spring
 from .search import acts_as_filter
@@ -115,8 +116,9 @@ def doubts_about(engine, best, gains, stds, left, noise):
         if rms < _LITTLE * rest and noise.rms is None and not best.effects[cause].everyday:
             doubts.setdefault(cause, f"it takes {rms:.3g} RMS only beside {rest:.3g} that are "
                                      "left, which nothing shows to be noise")
-        # noise makes nothing that changes with time
-        if rms < AS_NOISE * own and not best.effects[cause].shows_with_time:
+        # noise makes nothing that changes with time, or that goes with other axes
+        if rms < AS_NOISE * own and not best.effects[cause].shows_with_time \
+                and best.effects[cause].stage != CROSS_AXIS:
             doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) is no more than what the "
                                      f"reference's own noise makes ({own:.3g} RMS)")
     if min(takes.values(), default=np.inf) < WEIGHS * left.rms:
@@ -133,7 +135,8 @@ def doubts_about(engine, best, gains, stds, left, noise):
                                      "is left, and nothing shows that it is noise")
     for cause, words in {**by_what_is_left(engine, best, takes, left),
                          **_acausal(engine, best, stds), **_of_the_model(engine, best),
-                         **_as_slow(engine, best, added, takes)}.items():
+                         **_as_slow(engine, best, added, takes),
+                         **gradual(engine, best, gains)}.items():
         doubts.setdefault(cause, words)
     for pair in cancelling(added):
         # what begins or settles does so from a constant, which may be that of its start or its end
@@ -613,7 +616,9 @@ def _elsewhen(engine, best, takes, left):
                            "is another one"
     courses = [cause for cause in takes if best.effects[cause].shows_with_time
                and not best.effects[cause].everyday]
-    rest = engine.rms(best.residual)
+    # what coarse rounding leaves is of no course
+    rounding = (engine.coarse_step(best) or 0.0)**2 / 12
+    rest = math.sqrt(max(engine.rms(best.residual)**2 - rounding, 0.0))
     # a sweep's frequency and level change with time, too: several follow any course of the motion,
     # as several offsets do of the mean
     for kind in (False, True):

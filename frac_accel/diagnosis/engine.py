@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from ..budget import Division, established_noise
 from ..errors import FracAccelError
 from ..identification.fit.uncertainty import by_blocks, sandwich
-from ..identification.response.excitation import held_out, is_new
+from ..identification.response.excitation import STRETCHES, alternating_stretches, held_out, is_new
 from ..model import is_link
 from ..model.effects import effect_of
 from .gain import gain
@@ -31,6 +31,8 @@ WEIGHS = 3.0
 _RIVALS = 4
 # Records of more samples are searched in part first.
 LONG = 40_000
+# Samples that an error budget parts at most.
+PARTED = 100_000
 # Parts of the record in which a cause's strength is compared.
 _PARTS = 5
 # Causes that the whole of a long record may add to those of its part.
@@ -62,6 +64,9 @@ _SAME = 1.0
 _ALONE = 10.0
 # Share of the residual's power for which a coarse lattice must account.
 _COARSE = 0.2
+# RMS of the error of the model in use where it is judged, over that before, below which it errs
+# before.
+ERRS_THERE = 0.5
 # Error of a simulation, and of values put on other instants, over the output's spread.
 _SIMULATED, _RESAMPLED = 3e-5, 1e-4
 
@@ -102,7 +107,6 @@ class Engine:
         # samples that say nothing of other causes, by what the record shows by itself: those at a
         # limit, and those in which it drowns all else
         self.at_limit = self.drowned = np.zeros(len(record), bool)
-        self.held_out_rows = self.problem.used & held_out(self.problem.record.reference[:, axis])
         self._learnt, self._budgets, self._structures, self._left = {}, {}, {}, {}
         # what the numerics may still be wrong by: of the simulation, and of other instants
         self.floor = (_RESAMPLED if record.resampled else _SIMULATED) \
@@ -112,6 +116,21 @@ class Engine:
     def silent(self):
         """Samples of the record that say nothing of other causes."""
         return self.at_limit | self.drowned
+
+    @functools.cached_property
+    def held_out_rows(self):
+        """Samples that count and are not learnt from, but judged on, as a mask.
+
+        Where the model in use errs before them, as beside a zero that has settled, every other
+        stretch: nothing could be judged by them.
+        """
+        p = self.problem
+        reference = p.record.reference[:, p.axis]
+        last = held_out(reference)
+        error = self.search.baseline.residual
+        there, before = (np.std(error[p.used & rows]) for rows in (last, ~last))
+        return p.used & (last if there > ERRS_THERE * before
+                         else alternating_stretches(reference, STRETCHES))
 
     def threshold(self, fitted):
         """Cost by which a further parameter must improve on a fit."""
@@ -257,6 +276,13 @@ class Engine:
             worse = found.cost - best.cost > self.threshold(best)
             found = self.search.grow([self._beside_base(found.effects)], self.threshold,
                                      self.promises, self.noise_only, len(unwanted) - 1 + worse)
+        # two causes may say only together what each of them hardly does
+        known = min((fit for fit in self.search.fits.values()
+                     if not fit.rough and self._beside_base(fit.effects).keys()
+                     <= set(self.search.candidates)),
+                    key=lambda fit: fit.cost, default=found)
+        if found.cost - known.cost > self.threshold(known):
+            found = self.search.prune(known, self.threshold)
         # what was found beside the unwanted has met its rivals beside them only
         return self.compete(found, unwanted)
 
@@ -341,9 +367,9 @@ class Engine:
 
     @functools.cached_property
     def _division(self):
-        """Of the record, or where it is long of the part with the strongest motion."""
+        """Of the record, or where it is very long of the part with the strongest motion."""
         p = self.problem
-        self._parted = p.strongest(LONG // 2)
+        self._parted = p.strongest(PARTED)
         return Division(p.record.reference[self._parted], p.record.valid[self._parted], p.rate,
                         p.axis, quick=True)
 

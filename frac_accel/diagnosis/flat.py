@@ -23,6 +23,9 @@ _OVERDAMPED = 1.0
 # be better, and factor by which it may leave more power than an oscillator with another link, which
 # bends itself.
 _SURELY_LESS, _NEARLY_AS_GOOD = 0.005, 1.02
+# Share by which an oscillator's lead may differ from that of a mount's spring, and factor by which
+# the gain with a mount may then leave more power.
+_AS_A_MOUNT, _OF_A_MOUNT = 0.1, 1.1
 # Standard uncertainties by which both must differ for a parameter to be as open as that.
 _OPEN_FROM = 2.0
 # Times what the diagnosis leaves in the end (RMS) up to which a rival describes as much.
@@ -87,8 +90,10 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
                     [cause for cause in links if known_effects()[cause].acts_on(flat.core)],
                     limit=limit)
     fits = _with_a_link(engine, engine.search.fit({**engine.search.base, **beside}))
-    # as well with fewer parameters is better
-    as_well = (1 + _AS_WELL / own.problem.count) * before.cost
+    # as well with fewer parameters is better: what one more must gain, it must gain here, too
+    as_well = before.cost + own.threshold(before)
+    if _leads_as_a_mount(own, before):
+        as_well = max(as_well, _OF_A_MOUNT * before.cost)
     # without a resonance two lags are no oscillator: what else says as much is as likely
     enough = _FAR_LESS if model.axes[column].core.damping_ratio < _OVERDAMPED else 1.0
     found = next((fit for fit in fits if fit.cost <= enough * before.cost
@@ -100,6 +105,16 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
         return model, seed, rival
     return flat, {cause: effect for cause, effect in found.effects.items()
                   if cause not in engine.search.base}, None
+
+
+def _leads_as_a_mount(engine, fitted):
+    """Whether an oscillator is ahead by what the damping of a mount's spring makes, 2 zeta / omega,
+    which no sensor is by itself."""
+    model = engine.problem.axis_model(fitted.effects)
+    core = model.effective_core
+    lead_s = -sum(effect.pure_delay_s() for effect in model.effects)
+    of_mount_s = core.damping_ratio / (np.pi * core.natural_frequency_hz)
+    return abs(lead_s - of_mount_s) < _AS_A_MOUNT * of_mount_s
 
 
 def _or_with_a_link(own, before, fits):

@@ -38,6 +38,7 @@ from .words import (
     description_words,
     gain_words,
     hidden_words,
+    hides_much,
     hint_words,
     is_accounted,
     reason_of,
@@ -167,8 +168,9 @@ def _settled(engine, best, noise_std, known=None):
         Causes that a part of the record has shown already, with their gains there.
     """
     known = known or {}
-    here, dropped = _without_the_weakest(engine, _examined(engine, best, noise_std, known),
-                                         noise_std, known)
+    here = _examined(engine, best, noise_std, known)
+    here, dropped = _without_the_weakest(engine, _instead_of_idle(
+        engine, best, here, noise_std, known), noise_std, known)
     there, gone = here, {}
     for _ in range(_AGAIN):
         # what cannot be named must not stand in the way of what can
@@ -206,6 +208,17 @@ def _settled(engine, best, noise_std, known=None):
                             if cause not in there.gains})
             here = there
     return here, dropped
+
+
+def _instead_of_idle(engine, best, here, noise_std, known):
+    """A set in the place of one that describes the record, but not what its fit has not seen, if
+    it does and nothing in it is in doubt; else the set as it is."""
+    idle = best.causes - here.best.causes
+    if not idle or here.best.cost - best.cost <= engine.threshold(best):
+        return here
+    there = _examined(engine, engine.instead(best, idle), noise_std, known)
+    sure = there.gains.keys() > here.gains.keys() and not there.doubts
+    return there if sure else here
 
 
 def _without_the_weakest(engine, here, noise_std, known):
@@ -322,6 +335,9 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     verdict = verdict_of(
         findings, [] if plain else suspects, complete, 0.0 if plain else left.share,
         fraction, account.accounted, (strange and not plain) or account.faulty)
+    beyond = engine.record.beyond(engine.problem.axis)
+    if verdict == "consistent" and hides_much(beyond):
+        verdict = "undecided"
     described, kept, after, output = {}, {}, account.after, None
     if verdict in _INCOMPLETE or (strange and not plain):
         described, after, output = _described(engine, fitted, after, {part for _, part in strange})
@@ -351,7 +367,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     if p.in_own_core:
         model, findings = in_own_core(model, findings, p.in_own_core, AXES[p.axis])
     return Diagnosis(
-        verdict, reason_of(verdict, account.share, noise, account.accounted, strange)
+        verdict, reason_of(verdict, account.share, noise, account.accounted, strange, beyond)
         + set_aside(engine.aside, engine.drowned, engine.record.valid)
         + description_words([] if kept else [*described.values()], unnamed,
                             sorted(kept.keys() - fitted.causes), after / spread)

@@ -19,6 +19,8 @@ _STRETCH = 64
 _LASTS = 0.1
 # Times the rate at which the output is known before it is read between instants by a cubic spline.
 _FINE = 4
+# Steps of the lattice from which on a signal moves between two samples that are not neighbours.
+_MOVES_ON = 3.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,6 +55,18 @@ class Seen:
     spikes: np.ndarray
     is_coarse: bool
     parts: object
+
+    @functools.cached_property
+    def repeated(self):
+        """Share of the sensor's samples that say what the one before says, of those between whose
+        neighbours the signal moves on, by more than its lattice; 0 where it has no own ones."""
+        if "sensor" in self.record.resampled:
+            return 0.0
+        values = self.record.topics[1].values[:, self.axis] if self.record.topics \
+            else self.measured
+        across = np.abs(values[2:] - values[:-2])
+        moves = across > max(_MOVES_ON * (self.found.step or 0.0), float(np.median(across)))
+        return float(np.mean((values[1:-1] == values[:-2])[moves])) if moves.any() else 0.0
 
     @functools.cached_property
     def of_one_error(self):

@@ -15,6 +15,8 @@ _MOSTLY_NOISE = 0.3
 _SHOWN = 1e-4
 # Share of an error by which the reference's own noise is worth a word.
 _HIDDEN = 0.1
+# Share of the sensor's output (RMS) beyond the frequencies that are compared that is worth a word.
+_BEYOND = 0.01
 # Sampling intervals by which no sensor is earlier than what moves it.
 _EARLY = 2.0
 
@@ -22,6 +24,11 @@ _EARLY = 2.0
 def is_accounted(rmse, spread, noise):
     """Whether an error is small beside the output's spread, or no larger than established noise."""
     return rmse <= _LITTLE * spread or (noise.rms is not None and rmse <= AS_NOISE * noise.rms)
+
+
+def hides_much(beyond):
+    """Whether a sensor has more than a little beyond the frequencies that are compared."""
+    return beyond is not None and beyond.share > _LITTLE
 
 
 def verdict_of(findings, suspects, complete, share, fraction, accounted, strange):
@@ -37,7 +44,20 @@ def verdict_of(findings, suspects, complete, share, fraction, accounted, strange
     return "unexplained"
 
 
-def reason_of(verdict, nrmse, noise, accounted, strange):
+def reason_of(verdict, nrmse, noise, accounted, strange, beyond=None):
+    if verdict == "undecided" and accounted and hides_much(beyond):
+        return (f"the model explains the record up to {_percent(nrmse)} of the output where it is "
+                "compared, but there only; record the reference as fast as the sensor"
+                + beyond_words(beyond))
+    return _reason(verdict, nrmse, noise, accounted, strange) + beyond_words(beyond)
+
+
+def beyond_words(beyond):
+    """Words for what the sensor has beyond the frequencies that are compared."""
+    return f"; {beyond.words}" if beyond is not None and beyond.share > _BEYOND else ""
+
+
+def _reason(verdict, nrmse, noise, accounted, strange):
     shown = {"rest": "down to the noise that it shows at rest",
              "covariance": "down to the noise that its messages state",
              "periods": "down to the noise by which its repeated periods differ",

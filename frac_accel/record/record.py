@@ -7,12 +7,13 @@ import numpy as np
 
 from ..errors import FracAccelError
 from ..model import AXES
+from .beyond import beyond
 from .clock import usable
 from .held import first_of_held
 from .instants import put_on_instants
 from .pairing import FEWEST, by_slots, by_stamps, same_clock
 from .relation import clock_offset, refined
-from .resampling import guessed, within
+from .resampling import filled, guessed, within
 from .temperature import Temperature
 from .topic import Topic
 
@@ -151,6 +152,17 @@ class Record:
         found = np.zeros(len(self), bool)
         found[reached[(reached >= 0) & (reached < len(self))]] = True
         return found
+
+    def beyond(self, column):
+        """`Beyond` of one axis: what the sensor shows where a slower reference cannot; None without
+        one, or where the sensor has no uniform instants of its own."""
+        if self.band_hz is None or self.topics is None:
+            return None
+        reference, topic = self.topics
+        if topic.clock.kind == "uneven" or topic.clock.rate_hz <= reference.clock.rate_hz:
+            return None
+        values, _ = filled(topic.clock.slot, topic.values)
+        return beyond(values[:, column], topic.clock.rate_hz, self.band_hz)
 
     @functools.cached_property
     def rates_std_ppm(self):

@@ -8,9 +8,10 @@ from scipy.fft import irfft, next_fast_len, rfft
 # Means that a topic is reduced to for the correlation, at most.
 _MEANS = 1 << 16
 # Share of the sensor's power that the reference must explain at the peak, what may be explained
-# beside it, of that, and how many times as many lags as the peak is wide must say so.
+# beside it, of that, or how little it may leave of what is left beside it, and how many times as
+# many lags as the peak is wide must say so.
 _EXPLAINED = 0.3
-_BESIDE = 0.6
+_BESIDE, _LEAVES = 0.6, 0.1
 _WIDTHS = 40
 # Axes with less power than this, of the strongest one, do not move.
 _RESTS = 1e-4
@@ -230,7 +231,8 @@ def _clear(explained, peak):
     left, right = before[-1], peak + after[0]
     beside = max(explained[:left].max(initial=0.0), explained[right:].max())
     wide = len(explained) > _WIDTHS * (right - left)
-    return wide and beside < _BESIDE * explained[peak]
+    return wide and (beside < _BESIDE * explained[peak]
+                     or 1 - explained[peak] < _LEAVES * (1 - beside))
 
 
 def _vertex(three):

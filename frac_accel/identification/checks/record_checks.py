@@ -247,18 +247,29 @@ def _off_its_rest(values, run, valid, step):
     return max(steps) > max(_JUMP * np.std(values[valid]), _STEPS * step)
 
 
+def unclipped_reference(pair, column, valid, most=_CLIPPED_REFERENCE):
+    """Valid instants without those at which the reference is clipped, and words about these.
+
+    Raises
+    ------
+    IdentificationError
+        If they are more than `most` of the record: the sensor's motion after each is not known.
+    """
+    found = clipped_reference(pair.reference[:, column], pair.sensor[:, column], valid,
+                              pair.step("reference", column))
+    count = int(found.samples.sum())
+    if not count:
+        return valid, []
+    words = f"the reference is clipped at {found.words} in {count} of {len(pair)} samples"
+    if count > most * len(pair):
+        raise IdentificationError(f"{words}: what the sensor answered to there is unknown; "
+                                  "excite less or use a reference with a larger range")
+    return valid & ~found.samples, [f"{words}, which do not count"]
+
+
 def _unclipped(reference, sensor, valid, pair, column):
     """Valid instants without the clipped ones."""
-    notes = []
-    found = clipped_reference(reference, sensor, valid, pair.step("reference", column))
-    count = int(found.samples.sum())
-    if count:
-        words = f"the reference is clipped at {found.words} in {count} of {len(pair)} samples"
-        if count > _CLIPPED_REFERENCE * len(pair):
-            raise IdentificationError(f"{words}: what the sensor answered to there is unknown; "
-                                      "excite less or use a reference with a larger range")
-        notes.append(f"{words}, which do not count")
-        valid = valid & ~found.samples
+    valid, notes = unclipped_reference(pair, column, valid)
     found = clipped_sensor(reference, sensor, valid, pair.step("sensor", column),
                            pair.sampling_rate_hz, pair.lag_s)
     count = int(found.samples.sum())

@@ -20,7 +20,7 @@ _FEW, _OF_SINES = 8, ("sine", "stepped_sine")
 # Share of the reference's energy that a held-out check learns from; RMS of the rest, over that of
 # the former, below which it is too quiet for a judgement; stretches of which every other is then
 # held out.
-_LEARN, _QUIET_END, _STRETCHES = 0.6, 0.5, 20
+_LEARN, _QUIET_END, STRETCHES = 0.6, 0.5, 20
 # Energy of a frequency before, over that after, below which it is new there; share of new energy
 # from which the record is a sweep; stretches of it, and samples that each and a spectrum's segment
 # have.
@@ -296,7 +296,7 @@ def held_out(reference, valid=None):
     last = np.arange(len(reference)) >= np.searchsorted(energy, _LEARN * energy[-1])
     moving = reference - reference.mean()
     if np.std(moving[last]) < _QUIET_END * np.std(moving[~last]):
-        return alternating_stretches(reference, _STRETCHES)
+        return alternating_stretches(reference, STRETCHES)
     if is_new(moving[~last], moving[last]):
         return alternating_stretches(reference, min(_OF_SWEEP, len(reference) // _SHORTEST))
     return last

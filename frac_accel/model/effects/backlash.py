@@ -18,7 +18,8 @@ class Backlash(Effect):
 
     cause = "backlash"
     stage = CORE
-    explanation = "There is play: at each turn the output stays until the motion has gone through."
+    explanation = ("There is play: at each turn the output stays until the motion has gone "
+                   "through. Dry friction of a mass far below its resonance does the same.")
     experiment = ("Drive one slow sine at several levels: the output is flat after each turn, by "
                   "the same amount at every level.")
 

@@ -14,6 +14,9 @@ from .residual_power import follows, likelihood, slope_of, variance_law
 _SIGNIFICANT = 8.0
 _BETTER = 12.0
 _SHARE = 0.05
+# Share of samples that repeat the one before while the signal moves on, from which they are what
+# scatters.
+_REPEATED = 0.01
 # Correlation of one sample's shift with the next, above which the instants wander and do not
 # scatter.
 _INDEPENDENT = 0.2
@@ -44,6 +47,8 @@ class SamplingJitter(Effect):
         around = seen.of_one_error
         if seen.found.jitter_rms_s or around is None:
             return None  # stamps that scatter do the same, and so do values between samples
+        if seen.repeated > _REPEATED:
+            return None
         rate, used = seen.record.sampling_rate_hz, seen.used
         error = (seen.measured - seen.output)[used]
         slope = slope_of(seen.output)

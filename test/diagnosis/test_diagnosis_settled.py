@@ -1,0 +1,38 @@
+"""A zero that is right long before the record ends, where its end is what is judged by."""
+
+import numpy as np
+import pytest
+from sampled_pair import sampled_pair
+from scipy.signal import butter, sosfiltfilt
+
+from frac_accel import SensorModel, diagnose
+from frac_accel.model.core import Gain
+
+RATE, FINER, DURATION_S = 100.0, 4, 240.0
+
+
+def settling(seed):
+    """Reference and sensor with a zero that settles within a sixth of the record, on 0; its law."""
+    rng = np.random.default_rng(seed)
+    fine = FINER * RATE
+    motion = sosfiltfilt(butter(4, [0.3, 20.0], "band", fs=fine, output="sos"),
+                         rng.normal(size=round(fine * DURATION_S)))
+    motion /= motion.std()
+    size, constant_s = rng.choice([-1, 1]) * rng.uniform(0.1, 0.4), rng.uniform(8.0, 20.0)
+    time = np.arange(len(motion)) / fine
+    sensor = motion + size * np.exp(-time / constant_s)
+    return sampled_pair(rng, (motion, sensor), FINER, RATE, 0.005), -size, constant_s
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_zero_that_has_settled_is_named(seed):
+    record, size, constant_s = settling(seed)
+    found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
+    assert found.verdict == "explained"
+    named = {finding.cause: finding for finding in found.findings}
+    assert named.keys() == {"offset", "warm_up_drift"}
+    offset, settled = named["offset"], named["warm_up_drift"]
+    assert abs(offset.effect.offset + size) < 4 * offset.std["offset"]
+    assert abs(settled.effect.size - size) < 4 * settled.std["size"]
+    assert abs(settled.effect.time_constant_s - constant_s) < 4 * settled.std["time_constant_s"]
+    assert found.extended["nrmse"] < 0.01
