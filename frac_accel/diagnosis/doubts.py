@@ -16,8 +16,9 @@ from .problem import Problem, acts_on_spring
 from .search import acts_as_filter
 from .words import AS_NOISE
 
-# Times the odd (even) part of what is left, in RMS, that an odd (even) cause must take.
-_LIKE_LAW = 30.0
+# Times the odd (even) part of what is left, in RMS, that an odd (even) cause must take; and beside
+# a slower reference, which does not show all of what a law bends.
+_LIKE_LAW, _LIKE_LAW_BELOW = 30.0, 15.0
 # Logarithm of the size from which a link changes an end of the band, share of the motion's power
 # below its highest frequency, and damping ratio of a pole below which a link shows as a resonance.
 _UNDONE, _MOTION = 0.3, 0.99
@@ -343,13 +344,14 @@ def _other_laws(engine, best, takes, left):
     parts = {part: math.sqrt(share) * left.rms for share, part in engine.structure(best)
              if part in ("odd", "even")}
     found, filters = {}, _filters(engine, best)
+    alike = _LIKE_LAW_BELOW if engine.record.is_on_other_instants("sensor") else _LIKE_LAW
     for cause, taken in takes.items() if parts else ():
         effect = best.effects[cause]
         if cause in filters or effect.shows_with_time or effect.everyday or effect.is_constant \
                 or effect.stage == CROSS_AXIS:
             continue
         part = "odd" if engine.odd_share(best, cause) > 0.5 else "even"
-        if taken < _LIKE_LAW * parts.get(part, 0.0):
+        if taken < alike * parts.get(part, 0.0):
             found[cause] = f"what is left is {part} too ({parts[part]:.3g} RMS beside the " \
                            f"{taken:.3g} that it takes): the law is another one"
     return found
@@ -676,8 +678,9 @@ def _acausal(engine, best, stds):
              if not effect.restates_core}
     own = [cause for cause, effect in links.items() if not effect.of_reference]
     effects = p.axis_model(best.effects).effects
+    # by the stamps, or by the numbers of the samples: either may be when they were taken
     delay = sum(effect.pure_delay_s() for effect in effects if not effect.of_reference) \
-        - p.record.lag_s
+        - min(p.record.lag_s, 0.0)
     std = max((stds.get(cause, {}).get("delay_s", 0.0) for cause in own), default=0.0)
     if len(own) >= 2 and delay < 0 and delay <= -_ACAUSAL * std:
         return dict.fromkeys(own, f"together they come to a delay of {delay:.3g} s, which no "

@@ -284,7 +284,9 @@ class Engine:
         if found.cost - known.cost > self.threshold(known):
             found = self.search.prune(known, self.threshold)
         # what was found beside the unwanted has met its rivals beside them only
-        return self.compete(found, unwanted)
+        barred = {cause for fit in self.search.fits.values() for cause in fit.causes
+                  if cause not in self.search.base} - set(self.search.candidates)
+        return self.compete(found, barred)
 
     def everyday(self):
         """The smallest set of everyday causes."""

@@ -4,7 +4,7 @@ what a cause says, and faults of the record. Made at a far higher rate, without 
 import numpy as np
 import pytest
 from sampled_pair import sampled_pair
-from scipy.signal import butter, lfilter, sosfiltfilt
+from scipy.signal import bilinear, butter, lfilter, sosfilt, sosfiltfilt
 
 from frac_accel import Record, Samples, SensorModel, diagnose
 from frac_accel.model.core import Gain
@@ -64,27 +64,27 @@ def test_a_tone_beyond_what_is_compared_is_told(seed):
     assert Record.of(reference, sensor).beyond(0) is None
 
 
+def on_a_mount(motion, frequency_hz, ratio):
+    """Motion behind a mount's spring; the bilinear transform moves the peak by a hundredth at most.
+    """
+    omega = 2 * np.pi * frequency_hz
+    return lfilter(*bilinear([2 * ratio * omega, omega**2],
+                             [1, 2 * ratio * omega, omega**2], FINE), motion)
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_a_soft_mount_and_limits_are_told_without_a_model(seed):
     rng = np.random.default_rng(seed)
     motion = moving(rng, (0.5, 80.0), 60.0)
     frequency_hz, ratio = rng.uniform(45.0, 70.0), rng.uniform(0.04, 0.1)
-    # exact for an input that is linear between samples is more than eight times oversampling needs
-    omega, step = 2 * np.pi * frequency_hz, 2 * FINE
-    numerator = np.array([2 * ratio * omega * step + omega**2, 2 * omega**2,
-                          omega**2 - 2 * ratio * omega * step])
-    denominator = np.array([step**2 + 2 * ratio * omega * step + omega**2,
-                            2 * omega**2 - 2 * step**2,
-                            step**2 - 2 * ratio * omega * step + omega**2])
     offset = rng.uniform(0.1, 0.4)
-    sensor = lfilter(numerator, denominator, motion) + offset
+    sensor = on_a_mount(motion, frequency_hz, ratio) + offset
     reference, raw = sampled_pair(rng, (motion, sensor), FINER, RATE, 0.004)
     limit = np.quantile(np.abs(raw.values[:, 0]), 0.99)
     raw = Samples.of(raw.stamps_ns, np.clip(raw.values, -limit, limit))
     found = diagnose((reference, raw), time_limit_s=60)
     assert causes(found) == {"mounting_resonance", "offset", "clipping"}
     mount = next(f for f in found.findings if f.cause == "mounting_resonance")
-    # the bilinear transform moves the peak by a hundredth at most here
     assert mount.effect.frequency_hz == pytest.approx(frequency_hz, rel=0.01)
 
 
@@ -140,3 +140,31 @@ def test_a_turn_is_named_beside_a_noisy_reference(seed):
     found = gain_of_one((noisy, sensor))
     assert "reference_noise" in causes(found)
     assert causes(found) & {"misalignment", "cross_axis_sensitivity"}
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_samples_between_those_of_the_reference_lead_by_nothing(seed):
+    """A mount and AC coupling; the sensor samples some way between two samples of the reference."""
+    rng = np.random.default_rng(seed)
+    motion = moving(rng, (0.3, 40.0), 60.0)
+    sensor = sosfilt(butter(1, rng.uniform(0.2, 0.5), "high", fs=FINE, output="sos"),
+                     on_a_mount(motion, rng.uniform(35.0, 45.0), rng.uniform(0.05, 0.15)))
+    later = rng.integers(1, 4)
+    reference, raw = sampled_pair(rng, (motion[:-FINER], sensor[later:later - FINER]), FINER, RATE,
+                                  0.003)
+    raw = Samples.of(raw.stamps_ns + round(later / FINE * 1e9), raw.values)
+    assert causes(diagnose((reference, raw), time_limit_s=60)) == {"mounting_resonance",
+                                                                  "ac_coupling"}
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_dead_zone_is_named_beside_a_slower_reference(seed):
+    rng = np.random.default_rng(seed)
+    motion = moving(rng, (0.2, 2.5))
+    half_width = rng.uniform(0.08, 0.2)
+    sensor = motion - np.clip(motion, -half_width, half_width)
+    reference, raw = sampled_pair(rng, (motion, sensor), FINER, RATE, 0.003)
+    found = gain_of_one((Samples.of(reference.stamps_ns[::2], reference.values[::2]), raw))
+    assert causes(found) == {"dead_zone"}
+    dead = found.findings[0]
+    assert abs(dead.effect.half_width - half_width) < 4 * dead.std["half_width"]
