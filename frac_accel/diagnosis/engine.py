@@ -32,7 +32,7 @@ _RIVALS = 4
 # Records of more samples are searched in part first.
 LONG = 40_000
 # Samples that an error budget parts at most.
-PARTED = 100_000
+_PARTED = 40_000
 # Parts of the record in which a cause's strength is compared.
 _PARTS = 5
 # Causes that the whole of a long record may add to those of its part.
@@ -66,7 +66,7 @@ _ALONE = 10.0
 _COARSE = 0.2
 # RMS of the error of the model in use where it is judged, over that before, below which it errs
 # before.
-ERRS_THERE = 0.5
+_ERRS_THERE = 0.5
 # Error of a simulation, and of values put on other instants, over the output's spread.
 _SIMULATED, _RESAMPLED = 3e-5, 1e-4
 
@@ -129,7 +129,7 @@ class Engine:
         last = held_out(reference)
         error = self.search.baseline.residual
         there, before = (np.std(error[p.used & rows]) for rows in (last, ~last))
-        return p.used & (last if there > ERRS_THERE * before
+        return p.used & (last if there > _ERRS_THERE * before
                          else alternating_stretches(reference, STRETCHES))
 
     def threshold(self, fitted):
@@ -284,9 +284,7 @@ class Engine:
         if found.cost - known.cost > self.threshold(known):
             found = self.search.prune(known, self.threshold)
         # what was found beside the unwanted has met its rivals beside them only
-        barred = {cause for fit in self.search.fits.values() for cause in fit.causes
-                  if cause not in self.search.base} - set(self.search.candidates)
-        return self.compete(found, barred)
+        return self.compete(found, unwanted)
 
     def everyday(self):
         """The smallest set of everyday causes."""
@@ -371,7 +369,7 @@ class Engine:
     def _division(self):
         """Of the record, or where it is very long of the part with the strongest motion."""
         p = self.problem
-        self._parted = p.strongest(PARTED)
+        self._parted = p.strongest(_PARTED)
         return Division(p.record.reference[self._parted], p.record.valid[self._parted], p.rate,
                         p.axis, quick=True)
 
