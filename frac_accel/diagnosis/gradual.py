@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 
-from ..model.parameters import parameter_fields
 from ..signals.normal_equations import solve
 
 # Degree of the gradual change that is looked for on both sides of a jump; share of the jump that
@@ -26,16 +25,14 @@ def gradual(engine, fitted, causes):
     causes : collection of str
     """
     found = {}
-    for cause in causes:
-        effect = fitted.effects[cause]
-        name = next((field.name for field in parameter_fields(type(effect))
-                     if field.metadata.get("jumps")), None)
-        if name is None:
+    for unknown in fitted.unknowns:
+        if not unknown.jumps or unknown.cause not in causes:
             continue
-        left, std = _jump_left(engine.problem, fitted, cause, name)
+        left, std = _jump_left(engine.problem, fitted, unknown.cause, unknown.name)
         if left < max(_LEFT, _SURE * std):
-            found[cause] = f"beside a gradual change before and after it {max(left, 0.0):.0%} ± " \
-                           f"{std:.0%} of the jump are left: it may be none"
+            found[unknown.cause] = "beside a gradual change before and after it " \
+                                   f"{max(left, 0.0):.0%} ± {std:.0%} of the jump are left: it " \
+                                   "may be none"
     return found
 
 
