@@ -539,10 +539,10 @@ class Engine:
         """Causes of the model in use that are free, but known, and where they are known to be: what
         another cause says must not be put on them."""
         known = self._known()
-        stds = self.uncertainties(best) if known else {}
+        stds = self.uncertainties(best) if known else {}  # none of what a fit has held
         return [cause for cause in known if all(
             abs(getattr(best.effects[cause], name) - getattr(self.loose[cause].effect, name))
-            < _UNMOVED * np.hypot(std, stds[cause].get(name, 0.0))
+            < _UNMOVED * np.hypot(std, stds.get(cause, {}).get(name, 0.0))
             for name, std in self.loose[cause].std.items())]
 
     def _known(self):

@@ -91,6 +91,8 @@ class Search:
         # of the base, what has a course in time of its own, beside which all else is looked for
         self.courses = {}
         self.fits = {}
+        # by set, the orders and kinds that were best of all
+        self._compared = {}
         self.screens, self._starts = {}, {}
         self.stages = stages or Stages(None, problem.limit)
 
@@ -124,6 +126,10 @@ class Search:
     def to_its_best(self, fitted):
         """A fit that what is reported rests on: trials end as soon as they cannot win."""
         better = self.problem.carried_on(self.fit(fitted.effects))
+        if self._compared.get(better.causes) != _kinds(better.effects):
+            # beside all others another order may be the right one
+            better = self._varied(better, anew=True)
+            self._compared[better.causes] = _kinds(better.effects)
         if better is not self.fits.get(better.causes):
             self._keep(better)
         return better
@@ -201,12 +207,13 @@ class Search:
             self._keep(better)
         return better
 
-    def _varied(self, fit):
+    def _varied(self, fit, anew=False):
         """The best of a fit and its like with another of what no fit varies, such as an order or
-        which of two peaks is whose."""
+        which of two peaks is whose; `anew`: whatever has been compared in a smaller set."""
         fit, tried = self._exchanged(fit), set()
         # in a smaller set its like has been compared already
-        known = {cause for smaller in self.fits.values() if smaller.causes < fit.causes
+        known = set() if anew else {
+                 cause for smaller in self.fits.values() if smaller.causes < fit.causes
                  for cause, effect in smaller.effects.items()
                  if fixed_values(effect) == fixed_values(fit.effects[cause])}
         while True:

@@ -9,6 +9,7 @@ from ..errors import FracAccelError
 from ..model import AXES
 from .beyond import beyond
 from .clock import usable
+from .glitches import glitch_words, glitches
 from .held import first_of_held
 from .instants import put_on_instants
 from .pairing import FEWEST, by_slots, by_stamps, same_clock
@@ -267,6 +268,28 @@ class Record:
             leave gaps ten times as long as all samples, or no time in common with the other;
             or no temperature is finite.
         """
+        record = cls._paired(reference, sensor, axis, temperature)
+        faulty, words = record._reference_alone(reference.stamps_ns, AXES.index(axis))
+        if not faulty.any():
+            return record
+        values = np.where(faulty[:, None], np.nan, reference.values)
+        again = cls._paired(reference._replace(values=values), sensor, axis, temperature)
+        return dataclasses.replace(again, words=(*words, *again.words))
+
+    def _reference_alone(self, stamps_ns, column):
+        """Mask of the reference's samples with these stamps that are its own fault, and words."""
+        faulty = np.zeros(len(stamps_ns), bool)
+        runs = glitches(self.reference[:, column], self.sensor[:, column], self.valid)
+        place = (stamps_ns - self.start_ns) * 1e-9 * self.sampling_rate_hz
+        for rows in runs:
+            faulty |= (place > rows.start - 0.5) & (place < rows.stop - 0.5)
+        words = [glitch_words(int(faulty.sum()), [rows.start / self.sampling_rate_hz
+                                                  for rows in runs])] if runs else []
+        return faulty, words
+
+    @classmethod
+    def _paired(cls, reference, sensor, axis, temperature):
+        """`of`, whatever the reference's values are."""
         column = AXES.index(axis)
         (reference, held), (sensor, held_too) = map(first_of_held, (reference, sensor))
         one, two = Topic(reference, "reference"), Topic(sensor, "sensor")

@@ -1,0 +1,129 @@
+"""Faults of a reference that are its own: the sensor shows nothing of what it does there."""
+
+import numpy as np
+from scipy.linalg import LinAlgError, solve_toeplitz
+
+from ..shown import several
+
+# Samples on either side that the filter between the two reaches, and those that say what a sample
+# between them should be.
+_REACH, _NEIGHBOURS = 24, 12
+# Standard deviations beyond which a value counts no further when filters are fitted.
+_WILD = 8.0
+# Part of the power that is added to a spectrum, so that its filters are bounded.
+_FLOOR = 1e-6
+# Share of the reference's standard deviation that its filter from the sensor may leave.
+_ALIKE = 0.3
+# Standard deviations (by the median) of what filters leave from which a sample is far out, in both
+# directions.
+_FAR = 8.0
+# The same of what the neighbours do not say: by so much the reference must stand out, by as many
+# times as much as the sensor, which may do so much at most.
+_JUMPS, _TIMES, _QUIET = 6.0, 3.0, 5.0
+# Samples up to which what is far out is one event, and around it where the sensor must be quiet.
+_TOGETHER, _AROUND = 16, 8
+# Share of the samples above which they are no exception.
+_RARE = 0.05
+
+
+def glitches(reference, sensor, valid):
+    """Samples at which a reference alone does what no motion does.
+
+    Parameters
+    ----------
+    reference, sensor : ndarray, shape (n,)
+        On the same instants.
+    valid : ndarray of bool, shape (n,)
+
+    Returns
+    -------
+    list of slice
+        Runs of such samples.
+
+    Notes
+    -----
+    A motion shows on both sides. Where neither is what a filter makes of the other, one of them is
+    wrong: the one that is not what its neighbours on both sides say (best linear interpolation,
+    A. Papoulis, *Signal Analysis* (1977)), while the other goes on as before.
+    """
+    if np.count_nonzero(valid) < 8 * (2 * _REACH + 1):
+        return []
+    pair = [np.where(valid, values - np.median(values[valid]), 0.0)
+            for values in (reference, sensor)]
+    spreads = [_spread(values[valid]) for values in pair]
+    if min(spreads) == 0:
+        return []
+    # what is far beyond all else must not bend the filters by which it is found
+    tame = [np.clip(values, -_WILD * spread, _WILD * spread)
+            for values, spread in zip(pair, spreads)]
+    try:
+        back, there = (pair[to] - _filtered(tame[1 - to], tame[to], pair[1 - to]) for to in (0, 1))
+        alone = [_unsaid(values, of) for values, of in zip(pair, tame)]
+    except LinAlgError:
+        return []
+    if _spread(back[valid]) > _ALIKE * spreads[0]:
+        return []
+    back, there, own, other = (_in_spreads(values, valid) for values in (back, there, *alone))
+    far = np.flatnonzero(valid & (back > _FAR))
+    if not len(far):
+        return []
+    found = []
+    for run in np.split(far, np.flatnonzero(np.diff(far) > _TOGETHER) + 1):
+        first, last = run[0], run[-1] + 1
+        around = slice(max(first - _AROUND, 0), last + _AROUND)
+        quiet = float(np.max(other[around]))
+        if np.max(own[around]) > max(_JUMPS, _TIMES * quiet) and quiet < _QUIET \
+                and np.max(there[around]) > _FAR and valid[around].all():
+            found.append(slice(max(first - 1, 0), last + 1))
+    count = sum(rows.stop - rows.start for rows in found)
+    return found if count <= _RARE * len(valid) else []
+
+
+def glitch_words(count, seconds):
+    """What is said of so many samples, in runs that begin at certain times [s]."""
+    places = ", ".join(f"{at:.4g}" for at in seconds[:3]) + (" ..." if len(seconds) > 3 else "")
+    return (f"the reference alone jumps where the sensor goes on as before, "
+            f"{several(len(seconds), 'time')} (at {places} s): a fault of the reference; "
+            f"{several(count, 'sample')} of it {'does' if count == 1 else 'do'} not count")
+
+
+def _spread(values):
+    """Standard deviation by the median of the distance from zero."""
+    return 1.4826 * float(np.median(np.abs(values)))
+
+
+def _in_spreads(values, valid):
+    return np.abs(values) / max(_spread(values[valid]), np.finfo(float).tiny)
+
+
+def _shared(one, two, reach):
+    """Sums of products of one signal with another that is up to so many samples later."""
+    n = len(one)
+    return np.array([one[max(-lag, 0):n - max(lag, 0)] @ two[max(lag, 0):n - max(-lag, 0)]
+                     for lag in reach])
+
+
+def _taps(values, target, lags):
+    """Filter of least squares from one signal to another, at successive lags."""
+    own = _shared(values, values, range(len(lags)))
+    own[0] *= 1 + _FLOOR
+    return solve_toeplitz(own, _shared(values, target, lags))
+
+
+def _filtered(values, target, of):
+    """What the filter from `values` to `target` makes of a signal, both sides of a sample."""
+    return _centred(of, _taps(values, target, range(-_REACH, _REACH + 1)))
+
+
+def _unsaid(values, tame):
+    """What the samples on both sides do not say of the one between them."""
+    own = _shared(tame, tame, range(2 * _NEIGHBOURS + 1))
+    own[0] *= 1 + _FLOOR
+    # a row of the inverse covariance is the error of interpolation but for a factor
+    inverse = solve_toeplitz(own, np.arange(2 * _NEIGHBOURS + 1) == _NEIGHBOURS)
+    return _centred(values, inverse / inverse[_NEIGHBOURS])
+
+
+def _centred(values, taps):
+    """A signal behind a filter whose middle tap is without delay."""
+    return np.convolve(values, taps)[len(taps) // 2:][:len(values)]
