@@ -174,7 +174,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     begin, engine, best = _with_a_course(begin, engine, best, seed)
     if engine.part is None:
         engine, best = _without_start(begin, engine, best, found)
-        engine, best = _without_drowned(begin, engine, best, found, seed)
+    engine, best = _without_drowned(begin, engine, best, found, seed)
     stages.enter("judging what was found", JUDGED)
     judged = with_rival(judge(engine, best, found, shown, noise_std), rival)
     if orientation:
@@ -337,8 +337,8 @@ def _with_courses(begin, engine, courses):
 def _without_drowned(begin, engine, best, found, seed):
     """Engine whose fits leave out the samples in which what the record shows by itself, or what
     happened once, drowns all else, and its best set; those given where there are none."""
-    hidden = shown = drowned(engine, best, found)
-    if not hidden.any() and len(engine.record) == len(best.residual):
+    hidden = shown = drowned(engine, best if engine.part is None else engine.on_whole(best), found)
+    if not hidden.any() and engine.part is None and len(engine.record) == len(best.residual):
         hidden = event(best.residual, engine.problem.measured, engine.problem.used)
     if not hidden.any():
         return engine, best

@@ -69,7 +69,7 @@ _NO_LEAD = 0.01
 # Times what several filters leave (RMS) up to which one other filter is as likely.
 _ANOTHER = 1.05
 # Times the delay of a core that was identified which a lead beside it may take back.
-_TAKEN_BACK = 1.5
+_TAKEN_BACK = 3.0
 # Damping ratio from which a core has no peak, and times its own delay from which another one is
 # none of its kind.
 _NO_PEAK, _FAR_LATER = 0.8, 10.0

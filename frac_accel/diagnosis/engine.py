@@ -192,6 +192,10 @@ class Engine:
         dated = self.problem.dated(best)
         return best if dated == best.effects else self.search.again(dated)
 
+    def on_whole(self, fitted):
+        """A set as a part of a long record has shown it, fitted to the whole."""
+        return self.search.fit(self._beside_base(fitted.effects))
+
     def score(self, fitted, variance):
         """Cost with a penalty for each parameter, in units of the noise's variance."""
         return fitted.cost / variance + _CHANCE * fitted.size

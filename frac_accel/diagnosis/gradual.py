@@ -1,4 +1,4 @@
-"""Whether what jumps at an instant may as well have changed gradually."""
+"""Whether what jumps at an instant may as well have changed gradually, or not at all."""
 
 import dataclasses
 
@@ -11,12 +11,15 @@ from ..signals.normal_equations import solve
 _DEGREE = 2
 _LEFT = 0.5
 _SURE = 3.0
+# Share of what a jump changes on one side of it (RMS) that it must change on the other one.
+_MOVES = 0.05
 # Blocks of the record from whose errors the uncertainty is taken.
 _BLOCKS = 40
 
 
 def gradual(engine, fitted, causes):
-    """Causes that jump, where a gradual change on both sides leaves little of it, in words.
+    """Causes that jump, where a gradual change on both sides leaves little of it, or nothing moves
+    that would show it on one of them, in words.
 
     Parameters
     ----------
@@ -28,7 +31,17 @@ def gradual(engine, fitted, causes):
     for unknown in fitted.unknowns:
         if not unknown.jumps or unknown.cause not in causes:
             continue
-        left, std = _jump_left(engine.problem, fitted, unknown.cause, unknown.name)
+        p, at_s = engine.problem, getattr(fitted.effects[unknown.cause], unknown.name)
+        always = _if_always(p, fitted, unknown.cause, unknown.name)
+        since_s = (p.record.since_start_s + p.time - at_s)[p.used]
+        after = since_s >= 0
+        less, more = sorted(np.sqrt(np.mean(always[side]**2)) if side.any() else 0.0
+                            for side in (after, ~after))
+        if less < _MOVES * more:
+            found[unknown.cause] = "the motion that would show it is on one side of it only: it " \
+                                   f"changes {less:.3g} RMS on the other, {more:.3g} there"
+            continue
+        left, std = _jump_left(fitted.residual[p.used], always, since_s)
         if left < max(_LEFT, _SURE * std):
             found[unknown.cause] = "beside a gradual change before and after it " \
                                    f"{max(left, 0.0):.0%} ± {std:.0%} of the jump are left: it " \
@@ -36,20 +49,20 @@ def gradual(engine, fitted, causes):
     return found
 
 
-def _jump_left(problem, fitted, cause, name):
+def _if_always(problem, fitted, cause, name):
+    """What a jump would change if it had happened before the record, where samples count."""
+    rest = {other: effect for other, effect in fitted.effects.items() if other != cause}
+    early = dataclasses.replace(fitted.effects[cause], **{name: 0.0})
+    return (problem.simulate({**rest, cause: early}) - problem.simulate(rest))[problem.used]
+
+
+def _jump_left(residual, always, since_s):
     """Share of a jump that is left beside a gradual change on both sides of it, and its standard
     uncertainty from blocks of the record (M. H. Quenouille, *Biometrika* 43 (1956) 353-360)."""
-    effects, p = fitted.effects, problem
-    at_s = getattr(effects[cause], name)
-    rest = {other: effect for other, effect in effects.items() if other != cause}
-    always = p.simulate({**rest, cause: dataclasses.replace(effects[cause], **{name: 0.0})}) \
-        - p.simulate(rest)
-    since_s = p.record.since_start_s + p.time - at_s
-    place = (since_s / max(np.abs(since_s).max(), 1e-9))[p.used]
-    always, after = always[p.used], place >= 0
+    after, place = since_s >= 0, since_s / max(np.abs(since_s).max(), 1e-9)
     bent = [side * place**power for side in (after, ~after) for power in range(1, _DEGREE + 1)]
     columns = np.stack([after, np.ones(len(place)), *bent], axis=1) * always[:, None]
-    error = fitted.residual[p.used] + after * always
+    error = residual + after * always
     edges = np.linspace(0, len(place), _BLOCKS + 1).astype(int)
     grams = np.array([columns[a:b].T @ columns[a:b] for a, b in zip(edges, edges[1:])])
     sides = np.array([columns[a:b].T @ error[a:b] for a, b in zip(edges, edges[1:])])

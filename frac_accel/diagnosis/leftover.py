@@ -229,9 +229,11 @@ def _quiet(residual, simulated, used):
     here = weight > _BLOCK // 2
     power, signal, weight = power[here], signal[here], weight[here]
     quiet = np.argsort(signal)[:len(signal) // 2]
+    if len(quiet) < 8:
+        return 0.0, 0.0
     loud = signal > _LOUD * signal.max()
     loud[quiet] = False
-    if len(quiet) < 8 or not loud.any():
+    if not loud.any():
         return 0.0, 0.0
     level = np.log(power / weight + 1e-300)
     spread = np.std(level[quiet]) * np.sqrt(1 / loud.sum() + 1 / len(quiet))

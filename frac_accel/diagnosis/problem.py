@@ -15,6 +15,7 @@ from ..model.parameters import Scales, fixed_values, parameter_fields
 from ..signals.kept import kept
 from ..simulation import EDGE, AxisSimulator
 from ..simulation.free_motion import fading, free_motions
+from .in_band import InBand
 from .short_columns import ShortColumns
 from .time_limit import TimeLimit
 
@@ -180,6 +181,7 @@ class Problem:
         self.passed_on = self._passed = None
         self.limit = limit or TimeLimit()
         self.rate = record.sampling_rate_hz
+        self.in_band = InBand(record)
         self.time = np.arange(len(record)) / self.rate  # since this part's start
         self.measured = record.sensor[:, axis]
         self.used = used.copy()
@@ -205,7 +207,7 @@ class Problem:
             self._simulators[axis, steps] = AxisSimulator(
                 self.record.reference[:, axis], self.rate, self.record.temperature_c,
                 start_time_s=self.record.since_start_s, steps_per_sample=steps,
-                lag_s=self.record.lag_s)
+                lag_s=self.record.lag_s, shown=self.in_band.added)
         return self._simulators[axis, steps]
 
     def axis_model(self, effects, axis=None):
@@ -224,7 +226,7 @@ class Problem:
         values = simulator.respond(model)
         for effect in model.effects:
             if effect.stage != CROSS_AXIS:
-                values = effect.live(self.rate).simulate(values, simulator.circumstances)
+                values = self.in_band.behind(effect, values, simulator.circumstances)
             else:
                 shares = effect.share_of_axes(self.axis)
                 values = shares[self.axis] * values

@@ -56,6 +56,12 @@ class Seen:
     is_coarse: bool
     parts: object
 
+    @property
+    def is_uneven(self):
+        """Whether samples of a topic lie on no uniform instants: what is between them is a guess.
+        """
+        return any(topic.clock.kind == "uneven" for topic in self.record.topics or ())
+
     @functools.cached_property
     def repeated(self):
         """Share of the sensor's samples that say what the one before says, of those between whose
@@ -123,9 +129,9 @@ class Seen:
                 self.output[:len(counted)][used])
 
     def as_recorded(self):
-        """Values before they were resampled, the simulated output at their instants, and which of
-        them lie where the fit counted samples."""
-        if "sensor" in self.record.resampled:
+        """Values before they were resampled or filtered, the simulated output at their instants,
+        and which of them lie where the fit counted samples."""
+        if self.record.band_hz is not None and self.record.topics:
             return self._before_resampling()[1:]
         return self.measured[self.rows], self.output[self.rows], self.used[self.rows]
 

@@ -1,6 +1,7 @@
 """The verdict and its words."""
 
 from ..budget import WORDS
+from ..model.effects.base import STAMPS
 from ..shown import listed, several
 
 # Share of the output's RMS that may be left without noise being established, and factor by which an
@@ -39,7 +40,8 @@ def verdict_of(findings, suspects, complete, share, fraction, accounted, strange
     nothing = fraction < _NOTHING
     if findings and (nothing or complete and share <= _MOSTLY_NOISE):
         return "explained" if accounted else "partly_explained" if strange else "undecided"
-    if findings:
+    # when samples were taken, or that some are lost, explains nothing of what is left
+    if any(finding.effect.stage != STAMPS for finding in findings):
         return "partly_explained"
     return "unexplained"
 

@@ -34,6 +34,9 @@ _PARTS = 8
 # clock's: normal scatter of a third of an interval comes to 0.48.
 _MOST = 85
 _UNEVEN = 0.5
+# Instants from most samples to the next above which these are the ticks of a clock that reads the
+# samples now and then.
+_TICKS = 2
 # Scatter [intervals] about a line of stamps of which none is lost: a lost one in the middle, beside
 # such a scatter that rounding fails, makes it 0.33.
 _COMPLETE = 0.3
@@ -104,7 +107,7 @@ class Clock:
             if found is not None:
                 return found
         off = np.abs(place - np.median(place))
-        if np.percentile(off, _MOST) > _UNEVEN:
+        if np.percentile(off, _MOST) > _UNEVEN or np.median(np.diff(slot)) > _TICKS:
             steps = np.diff(merged(seconds))
             return cls("uneven", float(1 / np.percentile(steps, _LONG_STEP)), 0.0,
                        np.empty(0), 0.0)

@@ -18,10 +18,14 @@ _ALIKE = 0.3
 # directions.
 _FAR = 8.0
 # The same of what the neighbours do not say: by so much the reference must stand out, by as many
-# times as much as the sensor, which may do so much at most.
+# times as much as the sensor, and as the reference itself does beside, and the sensor at most.
 _JUMPS, _TIMES, _QUIET = 6.0, 3.0, 5.0
-# Samples up to which what is far out is one event, and around it where the sensor must be quiet.
-_TOGETHER, _AROUND = 16, 8
+# Samples up to which what is far out is one event, around it where the sensor must be quiet, and
+# beside it where the reference shows what is usual.
+_TOGETHER, _AROUND, _BESIDE = 16, 8, 50
+# Samples at the largest or smallest value that make it a limit, and how near the ones beside a run
+# come to it then [of the range].
+_PILE, _COMES_TO = 3, 0.2
 # Share of the samples above which they are no exception.
 _RARE = 0.05
 
@@ -67,16 +71,42 @@ def glitches(reference, sensor, valid):
     far = np.flatnonzero(valid & (back > _FAR))
     if not len(far):
         return []
-    found = []
-    for run in np.split(far, np.flatnonzero(np.diff(far) > _TOGETHER) + 1):
-        first, last = run[0], run[-1] + 1
-        around = slice(max(first - _AROUND, 0), last + _AROUND)
+    found, near = [], np.zeros(len(valid), bool)
+    runs = [slice(max(run[0] - 1, 0), run[-1] + 2)
+            for run in np.split(far, np.flatnonzero(np.diff(far) > _TOGETHER) + 1)]
+    for rows in runs:
+        # as far as it makes others stand out, too
+        near[max(rows.start - _NEIGHBOURS, 0):rows.stop + _NEIGHBOURS] = True
+    for rows in runs:
+        around = slice(max(rows.start - _AROUND, 0), rows.stop + _AROUND)
+        beside = slice(max(rows.start - _BESIDE, 0), rows.stop + _BESIDE)
+        as_usual = own[beside][~near[beside]]
         quiet = float(np.max(other[around]))
-        if np.max(own[around]) > max(_JUMPS, _TIMES * quiet) and quiet < _QUIET \
-                and np.max(there[around]) > _FAR and valid[around].all():
-            found.append(slice(max(first - 1, 0), last + 1))
+        if np.max(own[around]) > max(_JUMPS, _TIMES * quiet,
+                                     _TIMES * np.max(as_usual, initial=0.0)) \
+                and quiet < _QUIET and np.max(there[around]) > _FAR and valid[around].all():
+            found.append(rows)
     count = sum(rows.stop - rows.start for rows in found)
     return found if count <= _RARE * len(valid) else []
+
+
+def is_cut_off(values, there):
+    """Whether a run of samples stands at a limit to which the signal has come by itself.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        As published.
+    there : ndarray of bool, shape (n,)
+        The run.
+    """
+    rows = np.flatnonzero(there)
+    if not len(rows):
+        return False
+    ends = values[np.maximum(rows[0] - 1, 0)], values[np.minimum(rows[-1] + 1, len(values) - 1)]
+    return any(np.count_nonzero(values == limit) >= _PILE and (values[rows] == limit).any()
+               and min(abs(end - limit) for end in ends) < _COMES_TO * np.ptp(values)
+               for limit in (np.nanmin(values), np.nanmax(values)))
 
 
 def glitch_words(count, seconds):

@@ -17,6 +17,9 @@ _UNSURE = 6.0
 _SAME_RATE = 1e-3
 # Share of the samples that must stay for those near gaps to be left out.
 _CLEAR = 0.5
+# Sampling intervals by which most stamps of two uneven topics differ at most, beside a common lag,
+# where their samples were taken together.
+_TOGETHER = 0.1
 # Ratio of the rates up to which the sensor keeps its own instants though it is the faster one.
 _ALIKE = 1.01
 
@@ -46,6 +49,17 @@ def same_clock(one, two):
     # standard uncertainty of a fitted line's slope times its length
     unsure = np.sqrt(12 / count) * np.hypot(*(clock.scatter_s * clock.rate_hz for clock in clocks))
     return ratio < _SAME_RATE and ratio * count <= _NO_DRIFT + _UNSURE * unsure
+
+
+def share_instants(one, two):
+    """Have uneven samples that were taken together, one by one, lie on the first topic's instants:
+    what their stamps differ by, beside a common lag, is the writing of them."""
+    if len(one) != len(two) or any(topic.clock.kind != "uneven" for topic in (one, two)):
+        return
+    apart = two.stamps_ns - one.stamps_ns
+    lag = int(np.median(apart))
+    if np.percentile(np.abs(apart - lag), 95) < _TOGETHER * np.median(np.diff(one.stamps_ns)):
+        two.stamps_ns = one.stamps_ns + lag
 
 
 def by_slots(one, two):

@@ -9,10 +9,11 @@ from ..errors import FracAccelError
 from ..model import AXES
 from .beyond import beyond
 from .clock import usable
-from .glitches import glitch_words, glitches
+from .glitches import glitch_words, glitches, is_cut_off
+from .gravity import STANDARD_GRAVITY, gravity_words
 from .held import first_of_held
 from .instants import put_on_instants
-from .pairing import FEWEST, by_slots, by_stamps, same_clock
+from .pairing import FEWEST, by_slots, by_stamps, same_clock, share_instants
 from .relation import clock_offset, refined
 from .resampling import filled, guessed, within
 from .temperature import Temperature
@@ -30,7 +31,6 @@ _REACHED = 4
 # number of two digits one is round.
 _COARSE = 0.01
 _ROUND = 1e-5
-_STANDARD_GRAVITY = 9.80665
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -223,7 +223,8 @@ class Record:
     def integrity(self, column):
         """`Integrity` of an axis of the sensor."""
         found = self._topics[1].integrity(column, not self.is_on_other_instants("sensor"))
-        found.words.extend(self.words)
+        found.words.extend([*self.words, *gravity_words(self.reference[self.valid],
+                                                       self.sensor[self.valid])])
         step = self.step("reference", column)
         if step and step > _COARSE * np.std(self.reference[:, column]):
             found.words.append(f"the reference's values are multiples of {step:.6g}{_in_g(step)}")
@@ -269,23 +270,23 @@ class Record:
             or no temperature is finite.
         """
         record = cls._paired(reference, sensor, axis, temperature)
-        faulty, words = record._reference_alone(reference.stamps_ns, AXES.index(axis))
+        faulty, words = record._reference_alone(reference, AXES.index(axis))
         if not faulty.any():
             return record
         values = np.where(faulty[:, None], np.nan, reference.values)
         again = cls._paired(reference._replace(values=values), sensor, axis, temperature)
         return dataclasses.replace(again, words=(*words, *again.words))
 
-    def _reference_alone(self, stamps_ns, column):
-        """Mask of the reference's samples with these stamps that are its own fault, and words."""
-        faulty = np.zeros(len(stamps_ns), bool)
-        runs = glitches(self.reference[:, column], self.sensor[:, column], self.valid)
-        place = (stamps_ns - self.start_ns) * 1e-9 * self.sampling_rate_hz
-        for rows in runs:
-            faulty |= (place > rows.start - 0.5) & (place < rows.stop - 0.5)
-        words = [glitch_words(int(faulty.sum()), [rows.start / self.sampling_rate_hz
-                                                  for rows in runs])] if runs else []
-        return faulty, words
+    def _reference_alone(self, reference, column):
+        """Mask of the reference's samples that are its own fault, and words."""
+        faulty, starts = np.zeros(len(reference.stamps_ns), bool), []
+        place = (reference.stamps_ns - self.start_ns) * 1e-9 * self.sampling_rate_hz
+        for rows in glitches(self.reference[:, column], self.sensor[:, column], self.valid):
+            there = (place > rows.start - 0.5) & (place < rows.stop - 0.5)
+            if not is_cut_off(reference.values[:, column], there):
+                faulty |= there
+                starts.append(rows.start / self.sampling_rate_hz)
+        return faulty, [glitch_words(int(faulty.sum()), starts)] if starts else []
 
     @classmethod
     def _paired(cls, reference, sensor, axis, temperature):
@@ -297,6 +298,8 @@ class Record:
             _require_signal(topic, column)
         if np.array_equal(one.stamps_ns, two.stamps_ns):
             two.clock, two.stamps_ns = one.clock, one.stamps_ns
+        else:
+            share_instants(one, two)
         offset = clock_offset(one, two, int(one.stamps_ns[0]))
         taken_out = 0.0
         words = [f"the {topic.name} holds each value for {length:.3g} samples: the first of them "
@@ -416,7 +419,7 @@ def _is_lead(seconds, std_s):
 
 def _in_g(step):
     """The same in g, where it is a round number there."""
-    g = step / _STANDARD_GRAVITY
+    g = step / STANDARD_GRAVITY
     return f" ({g:.2g} g)" if abs(g / float(f"{g:.2g}") - 1) < _ROUND else ""
 
 

@@ -142,6 +142,9 @@ class AxisSimulator:
     steps_per_sample : int
         Steps of a nonlinear core in each sampling interval. Half as many leave an error about ten
         times as large.
+    shown : callable, optional
+        What of a nonlinear core's addition shows at the samples; default `sampled`, as in a record
+        that no filter has changed.
 
     Attributes
     ----------
@@ -158,7 +161,7 @@ class AxisSimulator:
     """
 
     def __init__(self, reference, sampling_rate_hz, temperature_c=None, start_time_s=0.0,
-                 initial="steady", steps_per_sample=_STEPS_PER_SAMPLE, lag_s=0.0):
+                 initial="steady", steps_per_sample=_STEPS_PER_SAMPLE, lag_s=0.0, shown=None):
         values = np.asarray(reference, float)
         if values.ndim != 1 or not len(values):
             raise FracAccelError(f"reference: shape {values.shape} given, expected (n,)")
@@ -177,6 +180,7 @@ class AxisSimulator:
         self._start_time_s = start_time_s
         self._least_steps = steps_per_sample
         self._lag_s = lag_s
+        self._shown = shown or sampled
         self._clear()
         self.circumstances = Circumstances(start_time_s + np.arange(self._n) / self._rate,
                                            _temperature(temperature_c, self._n))
@@ -219,7 +223,7 @@ class AxisSimulator:
         """The same simulator for another acceleration of the base."""
         return AxisSimulator(reference, self._rate, self.circumstances.temperature_c,
                              self._start_time_s, "steady" if self._level else "rest",
-                             self._least_steps, self._lag_s)
+                             self._least_steps, self._lag_s, self._shown)
 
     def _respond(self, axis_model):
         result, late_s = self._late(axis_model, 0.0), 0.0
@@ -320,10 +324,8 @@ class AxisSimulator:
             moving = conditioner.response(_product(filtering, conditioner.s), consumed=True)
         gain = _product([effect for effect in behind if effect.stage >= GAIN], np.array([1j]))
         start *= _static_gain(lambda s: _product(filtering, s)) if start else 0.0
-        if delay_s:
-            moving = at_positions(moving, steps * position)
-        else:
-            moving = moving[:steps * self._n:steps]
+        moving = self._shown(moving, steps, steps * position) if delay_s else \
+            self._shown(moving[:steps * self._n], steps, None)
         return gain[0].real * (moving + start)
 
     def _core_motion(self, links, natural, orders, steps, count):
@@ -364,6 +366,14 @@ class AxisSimulator:
             self._room_s = max(abs(delay_s), 64 / self._rate)
             self._convolution = Convolution(self._moving, self._rate, self._room_s)
         return self._convolution
+
+
+def sampled(fine, steps, position=None):
+    """Values at n samples, of those at so many steps in each interval, shape (steps n,).
+
+    `position` (n,): where the samples are among them [steps]; default: on each interval's first.
+    """
+    return fine[::steps] if position is None else at_positions(fine, position)
 
 
 def _kept_of_short(store, key, make, values, *arguments):

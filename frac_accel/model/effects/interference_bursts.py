@@ -65,7 +65,7 @@ class InterferenceBursts(Effect):
         # a burst of a few strong samples looks like spikes
         used = (seen.used | seen.spikes) & ~_near(~seen.record.valid)
         error, output = (seen.measured - seen.output)[used], seen.output[used]
-        if len(error) < 10 * _WINDOW:
+        if len(error) < 10 * _WINDOW or seen.is_uneven:
             return None
         least = _SHOWN_RESAMPLED if seen.record.resampled else _SHOWN
         noise, loud, share, better = _two_noises(error)
