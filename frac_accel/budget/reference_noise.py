@@ -13,7 +13,6 @@ has no bias (regression calibration: R. J. Carroll et al., *Measurement Error in
 import dataclasses
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 from scipy.signal import csd, welch
 
 from ..identification.response.recognise import recognise
@@ -37,8 +36,6 @@ _LINES_SHARED, _COHERENT = 12, 0.3
 _STANDS_OUT, _SCATTER, _NO_FILTER, _PASSES = 12.0, 1.2, 30.0, 4
 # Share of the floor that the median of the segments must have.
 _STEADY = 0.5
-# Lines on either side at which what is left of a motion counts as there: windows smear its end.
-_BESIDE = 4
 # Relative uncertainty at least: no noise is white to better than that.
 _AS_WHITE = 0.02
 # Rest: share of the stretches that may be at rest at least, how much louder than the quietest.
@@ -121,8 +118,7 @@ def reference_noise(record, column, used, covariance_std=None, transfer_function
         # an excess that bends nothing may be some other small thing
         if density <= _SCATTERS**2 * most and density * rate / 2 / power < _MOST \
                 and (bends or by != "excess"):
-            # where a motion ends between two lines, all of it stays
-            share = maximum_filter1d(np.clip(1 - density / own, 0.0, 1.0), 2 * _BESIDE + 1)
+            share = np.clip(1 - density / own, 0.0, 1.0)
             # a constant is no noise, and the first line holds what the window leaves of it
             share[:2] = 1.0, share[2]
             # nothing is compared beyond the band

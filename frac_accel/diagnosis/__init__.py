@@ -31,6 +31,7 @@ from .judgement import judge
 from .leftover import related
 from .read_off import drowned
 from .screened import screened
+from .search import is_nonlinear
 from .spikes import spikes, spikes_words
 from .sprung import beside_spring, is_bent, is_better, oscillator_of
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
@@ -337,6 +338,8 @@ def _with_courses(begin, engine, courses):
 def _without_drowned(begin, engine, best, found, seed):
     """Engine whose fits leave out the samples in which what the record shows by itself, or what
     happened once, drowns all else, and its best set; those given where there are none."""
+    if engine.part is not None and is_nonlinear(best):
+        return engine, best  # the whole of it would take too long
     hidden = shown = drowned(engine, best if engine.part is None else engine.on_whole(best), found)
     if not hidden.any() and engine.part is None and len(engine.record) == len(best.residual):
         hidden = event(best.residual, engine.problem.measured, engine.problem.used)

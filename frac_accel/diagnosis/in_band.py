@@ -3,7 +3,6 @@
 import numpy as np
 from scipy.signal import oaconvolve
 
-from ..model.effects.base import DEAD_ZONE
 from ..record.resampling import inner_taps
 from ..signals.convolution import Convolution
 from ..simulation import sampled
@@ -16,12 +15,13 @@ _FINE = 8
 class InBand:
     """Takes from what laws add to a motion what the record's own filter took from the sensor.
 
-    What is linear lies in the band as the reference does. The harmonics that a law makes lie beyond
-    it, too: a sensor with instants of its own shows them folded, one that was faster not at all.
+    A law bends all of a motion, and the filter came after it. What it makes beyond half the rate a
+    sensor with instants of its own shows folded, one that was faster not at all.
 
     Parameters
     ----------
     record : Record
+        With a `band_hz`.
     """
 
     def __init__(self, record):
@@ -31,25 +31,34 @@ class InBand:
     def added(self, fine, steps, position=None):
         """What of an addition shows at the record's instants, shape (n,); parameters as those of
         `simulation.sampled`."""
-        if self._band_hz is None:
-            return sampled(fine, steps, position)
         if self._fine == 1:
             return self._filtered(sampled(fine, steps, position), 1)
         return sampled(self._filtered(fine, steps), steps, position)
 
-    def behind(self, effect, values, circumstances):
-        """Samples behind an effect on them; laws bend them between the samples, too."""
-        own = effect.live(self._rate)
-        if self._band_hz is None or effect.stage != DEAD_ZONE:
-            return own.simulate(values, circumstances)
-        fine = values
+    def behind(self, effect, values, whole, circumstances):
+        """Samples behind a law of the output, and those before any filter.
+
+        Parameters
+        ----------
+        effect : Effect
+        values, whole : ndarray, shape (n,)
+            Samples before it as the record's filter leaves them, and before that.
+        circumstances : Circumstances
+
+        Returns
+        -------
+        list of ndarray, shape (n,)
+        """
+        fine = whole
         if self._fine > 1:
-            convolution = Convolution(values - values[0], self._rate)
-            fine = values[0] + convolution.response_between(
-                np.ones(len(convolution.s)), self._fine, self._fine * len(values))
+            # of a sensor that was faster, a law bends what is between the samples, too
+            convolution = Convolution(whole - whole[0], self._rate)
+            fine = whole[0] + convolution.response_between(
+                np.ones(len(convolution.s)), self._fine, self._fine * len(whole))
             circumstances = type(circumstances)(*(
                 None if each is None else np.repeat(each, self._fine) for each in circumstances))
-        return values + self.added(own.simulate(fine, circumstances) - fine, self._fine)
+        change = effect.live(self._fine * self._rate).simulate(fine, circumstances) - fine
+        return [values + self.added(change, self._fine), whole + change[::self._fine]]
 
     def _filtered(self, values, steps):
         taps = inner_taps(steps * self._rate, self._band_hz, len(values))

@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear
 from ..errors import FracAccelError
 from ..identification.response.excitation import strongest_stretch
 from ..model import AXES, AxisModel, is_link
-from ..model.effects.base import CORE, CROSS_AXIS, GAIN, Effect
+from ..model.effects.base import CORE, CROSS_AXIS, DEAD_ZONE, GAIN, Effect
 from ..model.parameters import Scales, fixed_values, parameter_fields
 from ..signals.kept import kept
 from ..simulation import EDGE, AxisSimulator
@@ -181,7 +181,7 @@ class Problem:
         self.passed_on = self._passed = None
         self.limit = limit or TimeLimit()
         self.rate = record.sampling_rate_hz
-        self.in_band = InBand(record)
+        self.in_band = InBand(record) if record.band_hz else None
         self.time = np.arange(len(record)) / self.rate  # since this part's start
         self.measured = record.sensor[:, axis]
         self.used = used.copy()
@@ -201,14 +201,34 @@ class Problem:
         """Number of samples that count."""
         return int(self.used.sum())
 
-    def simulator(self, axis, steps=_STEPS):
-        """Simulator of one axis, with as many steps in each sampling interval."""
-        if (axis, steps) not in self._simulators:
-            self._simulators[axis, steps] = AxisSimulator(
-                self.record.reference[:, axis], self.rate, self.record.temperature_c,
-                start_time_s=self.record.since_start_s, steps_per_sample=steps,
-                lag_s=self.record.lag_s, shown=self.in_band.added)
-        return self._simulators[axis, steps]
+    def simulator(self, axis, steps=_STEPS, part=None):
+        """Simulator of one axis, with as many steps in each sampling interval.
+
+        `part` of the output of a record that was filtered to a band: its "linear" motion; the
+        "deviation" that a law adds, which comes from all of the motion, and is filtered as the
+        record was; or the "whole" before any filter.
+        """
+        if (axis, steps, part) not in self._simulators:
+            record, filtered = self.record, part in (None, "linear")
+            self._simulators[axis, steps, part] = AxisSimulator(
+                record.reference[:, axis] if filtered else record.unfiltered, self.rate,
+                record.temperature_c, start_time_s=record.since_start_s, steps_per_sample=steps,
+                lag_s=record.lag_s, shown=self.in_band.added if part == "deviation" else None,
+                only=None if part == "whole" else part)
+        return self._simulators[axis, steps, part]
+
+    def _respond(self, model, steps):
+        """Output of core and links of the diagnosed axis; besides, where a law of the output will
+        bend it and the record was filtered, that before the filter."""
+        bends = model.static_force or model.path_dependent
+        parts = [None]
+        if self.record.unfiltered is not None and bends:
+            parts = ["linear", "deviation"]
+        outputs = [sum(self.simulator(self.axis, steps, part).respond(model) for part in parts)]
+        if self.record.unfiltered is not None \
+                and any(effect.stage == DEAD_ZONE for effect in model.effects):
+            outputs.append(self.simulator(self.axis, steps, "whole").respond(model))
+        return outputs
 
     def axis_model(self, effects, axis=None):
         """Model of an axis (default: the diagnosed one) with these causes."""
@@ -222,17 +242,19 @@ class Problem:
         """Output of the axis with these causes, shape (n,); without what comes across if asked."""
         self.calls += 1
         model = self.axis_model(effects)
-        simulator = self.simulator(self.axis, steps)
-        values = simulator.respond(model)
+        circumstances = self.simulator(self.axis, steps).circumstances
+        outputs = self._respond(model, steps)
         for effect in model.effects:
-            if effect.stage != CROSS_AXIS:
-                values = self.in_band.behind(effect, values, simulator.circumstances)
+            if effect.stage == DEAD_ZONE and len(outputs) > 1:
+                outputs = self.in_band.behind(effect, *outputs, circumstances)
+            elif effect.stage != CROSS_AXIS:
+                outputs = [effect.live(self.rate).simulate(values, circumstances)
+                           for values in outputs]
             else:
                 shares = effect.share_of_axes(self.axis)
-                values = shares[self.axis] * values
-                if across:
-                    values = values + self._across(effects, shares)
-        return values
+                added = self._across(effects, shares) if across else 0.0
+                outputs = [shares[self.axis] * values + added for values in outputs]
+        return outputs[0]
 
     def _across(self, effects, shares):
         """What the other axes add; so little that few steps do.
@@ -360,7 +382,9 @@ class Problem:
 
     def mirrored(self):
         """The same problem with the reference turned round."""
-        return Problem(dataclasses.replace(self.record, reference=-self.record.reference),
+        whole = self.record.unfiltered
+        return Problem(dataclasses.replace(self.record, reference=-self.record.reference,
+                                           unfiltered=None if whole is None else -whole),
                        self.axis, self.baseline, self.used, self.limit)
 
     def restricted(self, used):

@@ -47,6 +47,9 @@ _LITTLE = 0.25
 _FAR_LESS = 0.5
 # Variances of the noise within which orders and kinds of a cause say the same.
 _TIE = 10.0
+# Of those that are compared once more, how far one may have strayed that takes another's place [of
+# how far that has].
+_STRAYED = 0.5
 # Variances from the best fit of a round within which a fit must come if it goes on as it goes.
 _NEAR = 200.0
 
@@ -232,8 +235,12 @@ class Search:
                     except FracAccelError:
                         continue
             close = min(other.cost for other in [fit, *others]) * (1 + _TIE / self.problem.count)
-            better = min((other for other in [fit, *others] if other.cost <= close),
-                         key=lambda other: (self._strayed(other), other.cost))
+            near = [other for other in [fit, *others] if other.cost <= close]
+            if anew:
+                # what only says the same does not take its place
+                near = [fit, *(other for other in near
+                               if self._strayed(other) <= _STRAYED * self._strayed(fit))]
+            better = min(near, key=lambda other: (self._strayed(other), other.cost))
             if better is fit:
                 return fit
             fit = better
@@ -462,7 +469,7 @@ class Search:
         """
         filters = {cause for cause, effect in best.effects.items()
                    if cause not in self.base and acts_as_filter(effect)}
-        if len(filters) < 2 or _is_nonlinear(best) or self.problem.limit.ends_search(
+        if len(filters) < 2 or is_nonlinear(best) or self.problem.limit.ends_search(
                 "one filter in place of several was not tried"):
             return best
         rest = self.fit({c: effect for c, effect in best.effects.items() if c not in filters})
@@ -491,9 +498,9 @@ class Search:
             wanted = {}
             # beside noise only by what is clear whatever the spectrum of what would be left
             least = best.cost / (1 + threshold(best) / best.cost) if done(best) else np.inf
-            for parent in sorted(beam, key=_is_nonlinear):
+            for parent in sorted(beam, key=is_nonlinear):
                 promised = min((cost for cost, *_ in wanted.values()), default=np.inf)
-                if _is_nonlinear(parent) and promised < _FAR_LESS * parent.cost:
+                if is_nonlinear(parent) and promised < _FAR_LESS * parent.cost:
                     continue  # to screen beside a force or friction takes long
                 for cost, cause, begin in self.screen(parent):
                     key = parent.causes | {cause}
@@ -566,7 +573,7 @@ def _other(core, name):
     return dataclasses.replace(core, **{name: 0.9 * getattr(core, name)})
 
 
-def _is_nonlinear(fitted):
+def is_nonlinear(fitted):
     """Whether the motion of a fit is simulated step by step."""
     return any(acts_on_spring(effect) or follows_path(effect)
                for effect in fitted.effects.values())

@@ -75,6 +75,8 @@ class Record:
         one here.
     present : tuple of ndarray of bool, shape (n,), or None
         Where reference and sensor each have a sample; None where only `valid` is known.
+    unfiltered : ndarray, shape (n,), or None
+        Reference of the axis that `comparable` has filtered, as it was before.
 
     Examples
     --------
@@ -100,6 +102,7 @@ class Record:
     topics: tuple | None = None
     since_start_s: float = 0.0
     present: tuple | None = None
+    unfiltered: np.ndarray | None = None
 
     def __len__(self):
         return len(self.valid)
@@ -116,6 +119,7 @@ class Record:
             self, reference=self.reference[rows], sensor=self.sensor[rows], valid=self.valid[rows],
             present=self.present and tuple(there[rows] for there in self.present),
             temperature_c=celsius,
+            unfiltered=None if self.unfiltered is None else self.unfiltered[rows],
             start_ns=self.start_ns + int(rows.start * 1e9 / self.sampling_rate_hz),
             since_start_s=self.since_start_s + rows.start / self.sampling_rate_hz)
 
@@ -133,7 +137,8 @@ class Record:
                    zip(signals, signals[::-1], unknown)]
         for values, guess, which in zip(signals, guesses, unknown):
             values[:, column] = within(guess, self.sampling_rate_hz, self.band_hz, which)
-        return dataclasses.replace(self, reference=signals[0], sensor=signals[1])
+        return dataclasses.replace(self, reference=signals[0], sensor=signals[1],
+                                   unfiltered=guesses[0])
 
     def instants_of(self, which, column):
         """Mask, shape (n,): instants at which the sensor's value comes from some of its samples.

@@ -145,6 +145,8 @@ class AxisSimulator:
     shown : callable, optional
         What of a nonlinear core's addition shows at the samples; default `sampled`, as in a record
         that no filter has changed.
+    only : {None, "linear", "deviation"}
+        Only the linear motion of a core, or only what a nonlinear one adds to that.
 
     Attributes
     ----------
@@ -161,7 +163,8 @@ class AxisSimulator:
     """
 
     def __init__(self, reference, sampling_rate_hz, temperature_c=None, start_time_s=0.0,
-                 initial="steady", steps_per_sample=_STEPS_PER_SAMPLE, lag_s=0.0, shown=None):
+                 initial="steady", steps_per_sample=_STEPS_PER_SAMPLE, lag_s=0.0, shown=None,
+                 only=None):
         values = np.asarray(reference, float)
         if values.ndim != 1 or not len(values):
             raise FracAccelError(f"reference: shape {values.shape} given, expected (n,)")
@@ -180,7 +183,7 @@ class AxisSimulator:
         self._start_time_s = start_time_s
         self._least_steps = steps_per_sample
         self._lag_s = lag_s
-        self._shown = shown or sampled
+        self._shown, self._only = shown or sampled, only
         self._clear()
         self.circumstances = Circumstances(start_time_s + np.arange(self._n) / self._rate,
                                            _temperature(temperature_c, self._n))
@@ -223,7 +226,7 @@ class AxisSimulator:
         """The same simulator for another acceleration of the base."""
         return AxisSimulator(reference, self._rate, self.circumstances.temperature_c,
                              self._start_time_s, "steady" if self._level else "rest",
-                             self._least_steps, self._lag_s, self._shown)
+                             self._least_steps, self._lag_s, self._shown, self._only)
 
     def _respond(self, axis_model):
         result, late_s = self._late(axis_model, 0.0), 0.0
@@ -260,9 +263,11 @@ class AxisSimulator:
 
     def _at(self, axis_model, delay_s):
         """Response with this delay in all."""
-        result = self._linear(axis_model, delay_s)
+        result = np.zeros(self._n) if self._only == "deviation" \
+            else self._linear(axis_model, delay_s)
         force = axis_model.static_force
-        if (force or axis_model.path_dependent) and not (self._still and not self._level):
+        if (force or axis_model.path_dependent) and self._only != "linear" \
+                and not (self._still and not self._level):
             result += self._deviation(axis_model, force, delay_s)
         return result
 
