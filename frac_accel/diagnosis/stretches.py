@@ -207,4 +207,4 @@ def _joined(record, slices):
         return None if values is None else np.concatenate([values[rows] for rows in slices])
     return dataclasses.replace(record, **{
         name: taken(getattr(record, name))
-        for name in ("reference", "sensor", "valid", "temperature_c")})
+        for name in ("reference", "sensor", "valid", "temperature_c", "unfiltered")})
