@@ -10,6 +10,8 @@ from ..shown import several
 _REACH, _NEIGHBOURS = 24, 12
 # Standard deviations beyond which a value counts no further when filters are fitted.
 _WILD = 8.0
+# Standard deviations beyond which all values are as far.
+_BOUND = 1e6
 # Part of the power that is added to a spectrum, so that its filters are bounded.
 _FLOOR = 1e-6
 # Share of the reference's standard deviation that its filter from the sensor may leave.
@@ -52,20 +54,23 @@ def glitches(reference, sensor, valid):
     """
     if np.count_nonzero(valid) < 8 * (2 * _REACH + 1):
         return []
-    pair = [np.where(valid, values - np.median(values[valid]), 0.0)
-            for values in (reference, sensor)]
-    spreads = [_spread(values[valid]) for values in pair]
-    if min(spreads) == 0:
-        return []
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        pair = [np.where(valid, values - np.median(values[valid]), 0.0)
+                for values in (reference, sensor)]
+        spreads = [_spread(values[valid]) for values in pair]
+        if not (min(spreads) > 0 and np.isfinite(max(spreads))):
+            return []
+        # each in its own spread, whatever numbers a damaged record has
+        pair = [np.clip(values / spread, -_BOUND, _BOUND)
+                for values, spread in zip(pair, spreads)]
     # what is far beyond all else must not bend the filters by which it is found
-    tame = [np.clip(values, -_WILD * spread, _WILD * spread)
-            for values, spread in zip(pair, spreads)]
+    tame = [np.clip(values, -_WILD, _WILD) for values in pair]
     try:
         back, there = (pair[to] - _filtered(tame[1 - to], tame[to], pair[1 - to]) for to in (0, 1))
         alone = [_unsaid(values, of) for values, of in zip(pair, tame)]
     except LinAlgError:
         return []
-    if _spread(back[valid]) > _ALIKE * spreads[0]:
+    if _spread(back[valid]) > _ALIKE:
         return []
     back, there, own, other = (_in_spreads(values, valid) for values in (back, there, *alone))
     far = np.flatnonzero(valid & (back > _FAR))

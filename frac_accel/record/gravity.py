@@ -22,8 +22,10 @@ def gravity_words(reference, sensor):
     -------
     list of str
     """
-    moves = [np.linalg.norm(np.std(values, axis=0)) for values in (reference, sensor)]
-    if not moves[0] or not _ALIKE[0] < moves[1] / moves[0] < _ALIKE[1]:
+    with np.errstate(over="ignore", invalid="ignore"):  # of numbers beyond all measure
+        one, two = (np.linalg.norm(np.std(values, axis=0)) for values in (reference, sensor))
+        alike = one > 0 and _ALIKE[0] < two / one < _ALIKE[1]
+    if not alike:
         return []
     there, none = ([], [])
     for values, name in ((reference, "reference"), (sensor, "sensor")):

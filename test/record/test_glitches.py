@@ -97,3 +97,15 @@ def test_a_faster_reference_loses_the_samples_that_its_fault_reaches():
     assert not record.valid[rows - first].any()
     assert np.mean(record.valid) > 0.9
     assert np.std((record.reference[:, 0] - true[first:first + len(record)])[record.valid]) < 0.05
+
+
+@pytest.mark.parametrize("size", [1e300, 1e-310])
+@pytest.mark.filterwarnings("error")
+def test_numbers_beyond_all_measure_do_no_harm(size):
+    rng = np.random.default_rng(996)
+    true, sensor = pair(rng)
+    reference = true.copy()
+    reference[::1000] = 1.7e308
+    for signals in ((size * true, size * sensor), (reference, sensor), (true, reference)):
+        glitches(*signals, np.ones(COUNT, bool))
+    assert len(glitches(reference, sensor, np.ones(COUNT, bool))) > 15
