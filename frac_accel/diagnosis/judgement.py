@@ -213,12 +213,16 @@ def _settled(engine, best, noise_std, known=None):
 def _instead_of_idle(engine, best, here, noise_std, known):
     """A set in the place of one that describes the record, but not what its fit has not seen, if
     it does and nothing in it is in doubt; else the set as it is."""
-    idle = best.causes - here.best.causes
-    if not idle or here.best.cost - best.cost <= engine.threshold(best):
-        return here
-    there = _examined(engine, engine.instead(best, idle), noise_std, known)
-    sure = there.gains.keys() > here.gains.keys() and not there.doubts
-    return there if sure else here
+    there, fit, idle = here, best, set()
+    for _ in range(_AGAIN):
+        idle |= fit.causes - there.best.causes
+        if not idle or there.best.cost - fit.cost <= engine.threshold(fit):
+            break
+        fit = engine.instead(fit, idle)
+        there = _examined(engine, fit, noise_std, known)
+        if there.gains.keys() > here.gains.keys() and not there.doubts:
+            return there
+    return here
 
 
 def _without_the_weakest(engine, here, noise_std, known):
