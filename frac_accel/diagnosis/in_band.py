@@ -1,10 +1,9 @@
 """What laws make of a motion, as far as a record shows it that was filtered to a band."""
 
 import numpy as np
-from scipy.signal import oaconvolve
 
-from ..record.resampling import inner_taps
-from ..signals.convolution import Convolution
+from ..record.resampling import inner_filter
+from ..signals.convolution import refined
 from ..simulation import sampled
 
 # Points in each sampling interval at which a law bends the output of a sensor that was faster than
@@ -52,15 +51,11 @@ class InBand:
         fine = whole
         if self._fine > 1:
             # of a sensor that was faster, a law bends what is between the samples, too
-            convolution = Convolution(whole - whole[0], self._rate)
-            fine = whole[0] + convolution.response_between(
-                np.ones(len(convolution.s)), self._fine, self._fine * len(whole))
+            fine = refined(whole, self._fine)
             circumstances = type(circumstances)(*(
                 None if each is None else np.repeat(each, self._fine) for each in circumstances))
         change = effect.live(self._fine * self._rate).simulate(fine, circumstances) - fine
         return [values + self.added(change, self._fine), whole + change[::self._fine]]
 
     def _filtered(self, values, steps):
-        taps = inner_taps(steps * self._rate, self._band_hz, len(values))
-        longer = np.pad(values, len(taps) // 2, mode="reflect", reflect_type="odd")
-        return oaconvolve(longer, taps, mode="valid")
+        return inner_filter(steps * self._rate, self._band_hz, len(values))(values)

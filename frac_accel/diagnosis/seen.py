@@ -9,7 +9,7 @@ from scipy.signal import periodogram
 
 from ..model.effects import known_effects
 from ..record.resampling import filled, inner_taps
-from ..signals.convolution import Convolution
+from ..signals.convolution import refined
 from .gain import gain
 from .leftover import rounding_errors
 
@@ -164,9 +164,7 @@ class Seen:
     @functools.cached_property
     def _fine_output(self):
         # a filter by windows would ripple: under gravity, by more than stamps that scatter do
-        convolution = Convolution(self.output - self.output[0], 1.0)
-        return self.output[0] + convolution.response_between(
-            np.ones(len(convolution.s)), _FINE, _FINE * len(self.output))
+        return refined(self.output, _FINE)
 
 
 def added(engine, fitted):

@@ -138,11 +138,16 @@ def _shared(one, two, reach):
                      for lag in reach])
 
 
+def _own(values, count):
+    """A signal's products with itself at so many lags, with the floor that bounds its filters."""
+    own = _shared(values, values, range(count))
+    own[0] *= 1 + _FLOOR
+    return own
+
+
 def _taps(values, target, lags):
     """Filter of least squares from one signal to another, at successive lags."""
-    own = _shared(values, values, range(len(lags)))
-    own[0] *= 1 + _FLOOR
-    return solve_toeplitz(own, _shared(values, target, lags))
+    return solve_toeplitz(_own(values, len(lags)), _shared(values, target, lags))
 
 
 def _filtered(values, target, of):
@@ -152,10 +157,9 @@ def _filtered(values, target, of):
 
 def _unsaid(values, tame):
     """What the samples on both sides do not say of the one between them."""
-    own = _shared(tame, tame, range(2 * _NEIGHBOURS + 1))
-    own[0] *= 1 + _FLOOR
+    count = 2 * _NEIGHBOURS + 1
     # a row of the inverse covariance is the error of interpolation but for a factor
-    inverse = solve_toeplitz(own, np.arange(2 * _NEIGHBOURS + 1) == _NEIGHBOURS)
+    inverse = solve_toeplitz(_own(tame, count), np.arange(count) == _NEIGHBOURS)
     return _centred(values, inverse / inverse[_NEIGHBOURS])
 
 

@@ -52,8 +52,12 @@ def same_clock(one, two):
 
 
 def share_instants(one, two):
-    """Have uneven samples that were taken together, one by one, lie on the first topic's instants:
-    what their stamps differ by, beside a common lag, is the writing of them."""
+    """Have topics with the same stamps share a clock, and uneven samples that were taken together,
+    one by one, lie on the first topic's instants: what their stamps differ by, beside a common lag,
+    is the writing of them."""
+    if np.array_equal(one.stamps_ns, two.stamps_ns):
+        two.clock, two.stamps_ns = one.clock, one.stamps_ns
+        return
     if len(one) != len(two) or any(topic.clock.kind != "uneven" for topic in (one, two)):
         return
     apart = two.stamps_ns - one.stamps_ns

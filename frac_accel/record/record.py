@@ -301,10 +301,7 @@ class Record:
         one, two = Topic(reference, "reference"), Topic(sensor, "sensor")
         for topic in (one, two):
             _require_signal(topic, column)
-        if np.array_equal(one.stamps_ns, two.stamps_ns):
-            two.clock, two.stamps_ns = one.clock, one.stamps_ns
-        else:
-            share_instants(one, two)
+        share_instants(one, two)
         offset = clock_offset(one, two, int(one.stamps_ns[0]))
         taken_out = 0.0
         words = [f"the {topic.name} holds each value for {length:.3g} samples: the first of them "

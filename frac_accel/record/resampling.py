@@ -95,6 +95,17 @@ def inner_taps(rate_hz, band_hz, count):
     return firwin(2 * half + 1, (1 + _INNER) / 2 * band_hz, window=("kaiser", _KAISER), fs=rate_hz)
 
 
+def inner_filter(rate_hz, band_hz, count):
+    """The same as a function of so many samples, without delay."""
+    from scipy.signal import oaconvolve
+    taps = inner_taps(rate_hz, band_hz, count)
+
+    def inside(values):
+        longer = np.pad(values, len(taps) // 2, mode="reflect", reflect_type="odd")
+        return oaconvolve(longer, taps, mode="valid")
+    return inside
+
+
 def within(values, rate_hz, band_hz, unknown):
     """Uniform samples without what is beyond a band, by a filter of linear phase without delay.
 
@@ -110,13 +121,7 @@ def within(values, rate_hz, band_hz, unknown):
     -------
     ndarray, shape (n,)
     """
-    from scipy.signal import oaconvolve
-    taps = inner_taps(rate_hz, band_hz, len(values))
-    half = len(taps) // 2
-
-    def inside(values):
-        longer = np.pad(values, half, mode="reflect", reflect_type="odd")
-        return oaconvolve(longer, taps, mode="valid")
+    inside = inner_filter(rate_hz, band_hz, len(values))
     return inside(_bridged(values, unknown, inside))
 
 

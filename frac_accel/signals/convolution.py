@@ -109,6 +109,13 @@ def exponentials(first, step, count):
     return np.outer(outer, np.exp(step * np.arange(inner))).ravel()[:count]
 
 
+def refined(values, factor):
+    """Band-limited samples at as many times the rate, shape (factor n,); before the first one it
+    stood still there."""
+    moved = Convolution(values - values[0], 1.0)
+    return values[0] + moved.response_between(1.0, factor, factor * len(values))
+
+
 def at_positions(values, position):
     """Values between samples, by the polynomial through the eight nearest.
 
