@@ -702,7 +702,9 @@ def _moved(engine, best, stds):
     those in doubt, with words."""
     findings, doubtful = [], {}
     for cause, entry in engine.loose.items():
-        effect = best.effects[cause]
+        effect = best.effects.get(cause)
+        if effect is None:
+            continue  # another cause stands in its place
         farthest = max(abs(getattr(effect, name) - getattr(entry.effect, name))
                        / np.hypot(std, stds[cause].get(name, 0.0))
                        for name, std in entry.std.items())

@@ -56,7 +56,7 @@ def with_turn(judged, engine, orientation):
         judged, verdict=_WITH_TURN.get(judged.verdict, judged.verdict),
         reason=f"turned into the reference's axes, {judged.reason}",
         findings=[*(f for f in judged.findings if f.cause != effect.cause), finding],
-        model=_turned_model(judged.model, effect),
+        model=_turned_model(judged.model, AXES[axis], effect),
         baseline={**judged.baseline, "rmse": g.before, "nrmse": g.before / spread},
         unexplained_fraction=min(left / was, 1.0) if was else 0.0,
         budget=[*engine.budget_between(published, simulated, engine.record.valid)
@@ -64,10 +64,17 @@ def with_turn(judged, engine, orientation):
                 *(entry for entry in judged.budget if entry["of"] == "extended")])
 
 
-def _turned_model(model, effect):
-    axes = {}
+def _turned_model(model, axis, effect):
+    """A model with the turn on each axis. What was found to be added to the turned signal of one
+    axis, each of the sensor's own axes has its share of."""
+    found, axes = model.axis(axis), {}
     for name in AXES:
         own = model.axis(name)
-        axes[name] = AxisModel(own.core, (*(e for e in own.effects if e.cause != effect.cause),
-                                          effect))
+        there = {e.cause for e in own.effects}
+        share = float(effect.share_of_axes(AXES.index(name))[AXES.index(axis)])
+        added = [e.in_share(share) for e in found.effects
+                 if e.adds and (name == axis or e.cause not in there)]
+        replaced = {effect.cause, *(e.cause for e in added)}
+        axes[name] = AxisModel(own.core, (*(e for e in own.effects if e.cause not in replaced),
+                                          effect, *added))
     return SensorModel(model.core, model.effects, axes, model.metadata, model.reference_faults)

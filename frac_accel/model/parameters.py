@@ -98,9 +98,9 @@ def coefficients(unit="", default=None):
     return dataclasses.field(default=default, metadata=metadata)
 
 
-def choice(*words):
+def choice(*words, default=dataclasses.MISSING):
     """Declare a word of an effect, one of those given; no fit varies it."""
-    return dataclasses.field(metadata={"choices": words, "unit": "1"})
+    return dataclasses.field(default=default, metadata={"choices": words, "unit": "1"})
 
 
 def is_varied(field):

@@ -82,8 +82,9 @@ class Validation(Shown):
         why the correction is judged in a narrower band than the simulation.
     whole_nrmse : float
         RMS of simulated less measured output over the measured one's standard deviation, at all
-        frequencies, without `simulation.EDGE` samples at both ends and without what the time before
-        the record may have left of the sensor's motion, which nobody knows.
+        frequencies, where both have samples, without `simulation.EDGE` samples at both ends and
+        without what the time before the record may have left of the sensor's motion, which nobody
+        knows.
     whole_hz : float or None
         Frequency up to which that counts, where rates differ; None where all do.
     signals : tuple of ndarray
@@ -179,8 +180,9 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     >>> judged.simulation.total.nrmse > 0.1  # the model in use lacks two effects
     True
     """
-    reference, sensor, pair, turned, measured, simulated = _simulated_of(
+    reference, sensor, pair, turned, outputs = _simulated_of(
         source, model, axis, temperature_at, sampling_rate_hz)
+    measured, simulated = outputs.longest
     require_wishes(**{name: value for name, value in wishes.items() if name in _WISHES})
     band, rate = _judged_band(pair, AXES.index(axis)), pair.sampling_rate_hz
     words, why, comparison, filters, counters = pair.words, "", None, {}, {}
@@ -193,7 +195,7 @@ def validate(source: Any, model: SensorModel, axis: str = "x",
     return Validation(
         simulation=error_metrics(measured, simulated, rate, octave_bands(*band)),
         comparison=comparison, filters=filters, counters=counters, words=tuple(words),
-        whole_nrmse=_nrmse(measured, simulated, pair), whole_hz=pair.band_hz, turned=turned,
+        whole_nrmse=outputs.nrmse(pair), whole_hz=pair.band_hz, turned=turned,
         no_correction=why, signals=(np.arange(len(measured)) / rate, measured, simulated))
 
 
@@ -246,28 +248,52 @@ def whole_nrmse(source, model, axis="x", temperature_at=None):
 
     Parameters and errors as those of `validate`.
     """
-    *_, pair, _, measured, simulated = _simulated_of(source, model, axis, temperature_at)
-    return _nrmse(measured, simulated, pair)
+    *_, pair, _, outputs = _simulated_of(source, model, axis, temperature_at)
+    return outputs.nrmse(pair)
 
 
-def _nrmse(measured, simulated, pair):
-    """As far as both can be compared: beyond it, what one of them cannot show is no error."""
-    error = measured - simulated
-    if pair.band_hz:
-        none = np.zeros(len(error), bool)
-        error, measured = (within(values, pair.sampling_rate_hz, pair.band_hz, none)
-                           for values in (error, measured))
-    return float(np.sqrt(np.mean(error**2)) / np.std(measured))
+@dataclasses.dataclass(frozen=True)
+class _Outputs:
+    """Measured and simulated output, shape (n,) each; the samples that count of all, and their
+    longest run without a gap."""
+
+    measured: np.ndarray
+    simulated: np.ndarray
+    counted: np.ndarray
+    run: slice
+
+    @property
+    def longest(self):
+        return self.measured[self.run], self.simulated[self.run]
+
+    @property
+    def mean_square(self):
+        return np.mean(np.square((self.measured - self.simulated)[self.counted]))
+
+    def nrmse(self, pair):
+        """As far as both can be compared: beyond it, what one of them cannot show is no error."""
+        error, measured = self.measured - self.simulated, self.measured
+        if pair.band_hz:
+            first, last = np.flatnonzero(self.counted)[[0, -1]]
+            within_rows = slice(first, last + 1)
+            counted = self.counted[within_rows]
+            error, measured = (
+                within(np.where(counted, values[within_rows], 0.0), pair.sampling_rate_hz,
+                       pair.band_hz, ~counted)[counted]
+                for values in (error, measured))
+        else:
+            error, measured = error[self.counted], measured[self.counted]
+        return float(np.sqrt(np.mean(error**2)) / np.std(measured))
 
 
 def _simulated_of(source, model, axis, temperature_at, sampling_rate_hz=None):
-    """Restored reference, sensor, their `Record`, whether the signals were turned, and measured
-    and simulated output."""
+    """Restored reference, sensor, their `Record`, whether the signals were turned, and
+    `_Outputs`."""
     reference, sensor = pair_of(source, sampling_rate_hz, axis)
     reference = restored(reference, sensor, model, axis, temperature_at)
     pair = Record.of(reference, sensor, axis)
     back = turn_back(model.axes, AXES.index(axis))
-    return reference, sensor, pair, back is not None, *_simulated(
+    return reference, sensor, pair, back is not None, _simulated(
         model, pair, AXES.index(axis), temperature_at, back)
 
 
@@ -349,7 +375,7 @@ def _corrected(corrector, sensor, temperature_at):
 
 
 def _simulated(model, pair, column, temperature_at, back):
-    """Measured and simulated output at the same instants; of a turned sensor turned `back`."""
+    """`_Outputs` at the same instants; of a turned sensor turned `back`."""
     rows = np.eye(3)[column] if back is None else back[column]
     measured = pair.sensor @ rows
     temperature = None
@@ -371,12 +397,13 @@ def _simulated(model, pair, column, temperature_at, back):
                              start_time_s=pair.start_time_s)
         shifted = interpolate(instants, simulated, instants + round(1e9 * pair.lag_s),
                               pair.sampling_rate_hz) @ rows
-        run = _longest_run(np.isfinite(shifted) & inside, instants, pair.sampling_rate_hz)
-        return measured[run], shifted[run] + _begun_before(
-            own, (measured - shifted)[run], pair.sampling_rate_hz)
+        counted = np.isfinite(shifted) & inside
+        run = _longest_run(counted, instants, pair.sampling_rate_hz)
+        return _Outputs(measured, shifted + _begun_before(
+            own, measured - shifted, counted, pair.sampling_rate_hz), counted, run)
     # how it moved before the record is not known: a free mass does not move on by itself
     return min((begun(initial) for initial in ("steady", "rest")),
-               key=lambda both: np.mean(np.square(both[0] - both[1])))
+               key=lambda outputs: outputs.mean_square)
 
 
 def _without_stage(model, stage):
@@ -386,11 +413,12 @@ def _without_stage(model, stage):
     return SensorModel(model.core, (), axes, model.metadata, model.reference_faults)
 
 
-def _begun_before(own, error, rate):
+def _begun_before(own, error, counted, rate):
     """What the time before the record has left of an axis' slow motion: as nobody knows it, that
-    which fits best."""
-    free = free_motions(own, np.arange(len(error)) / rate, np.ones(len(error), bool))
-    return free @ np.linalg.lstsq(free, error, rcond=_SEEN)[0] if free.size else 0.0
+    which fits best where samples count."""
+    free = free_motions(own, np.arange(len(error)) / rate, counted)
+    return free @ np.linalg.lstsq(free[counted], error[counted], rcond=_SEEN)[0] \
+        if free.size else 0.0
 
 
 def _longest_run(good, stamps_ns, rate):

@@ -1,11 +1,14 @@
 """A zero that is right long before the record ends, where its end is what is judged by."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from sampled_pair import sampled_pair
 from scipy.signal import butter, sosfiltfilt
 
 from frac_accel import SensorModel, diagnose
+from frac_accel.diagnosis.judgement import _moved
 from frac_accel.model.core import Gain
 
 RATE, FINER, DURATION_S = 100.0, 4, 240.0
@@ -30,9 +33,14 @@ def test_a_zero_that_has_settled_is_named(seed):
     found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
     assert found.verdict == "explained"
     named = {finding.cause: finding for finding in found.findings}
-    assert named.keys() == {"offset", "warm_up_drift"}
-    offset, settled = named["offset"], named["warm_up_drift"]
-    assert abs(offset.effect.offset + size) < 4 * offset.std["offset"]
-    assert abs(settled.effect.size - size) < 4 * settled.std["size"]
+    assert named.keys() == {"warm_up_drift"}
+    settled = named["warm_up_drift"]
+    assert settled.effect.settles_at == "zero"
+    assert abs(settled.effect.size + size) < 4 * settled.std["size"]
     assert abs(settled.effect.time_constant_s - constant_s) < 4 * settled.std["time_constant_s"]
     assert found.extended["nrmse"] < 0.01
+
+
+def test_what_was_open_and_gave_way_to_another_cause_has_not_moved():
+    engine = SimpleNamespace(loose={"sensitivity_error": None})
+    assert _moved(engine, SimpleNamespace(effects={}), {}) == ([], {})

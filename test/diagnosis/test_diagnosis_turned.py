@@ -13,7 +13,7 @@ RATE, GRAVITY, SECONDS = 10.0, 9.81, 400
 QUARTER = np.array([[0.0, 0, 1], [0, -1, 0], [1, 0, 0]])
 
 
-def drive(seed, late_s, left=0.3):
+def drive(seed, late_s, left=0.3, offset=0.0):
     """A car's own values without gravity, late, and those of a phone that lies turned; what a
     sample truly is in the car's axes; and the rotation from the car's axes to the phone's."""
     rng = np.random.default_rng(seed)
@@ -30,7 +30,7 @@ def drive(seed, late_s, left=0.3):
     def read(values, when):
         return np.stack([np.interp(when, t, axis) for axis in values.T], axis=1)
     car = read(motion, at - late_s) * [1, 1, 0]
-    phone = (read(motion + shakes, at) + [0, 0, GRAVITY]) @ turn.T
+    phone = (read(motion + shakes, at) + [offset, 0, GRAVITY]) @ turn.T
     stamps = np.round(1e9 * (1000 + at))
     return Samples.of(stamps, car), Samples.of(stamps, phone), read(motion, at), turn
 
@@ -61,3 +61,22 @@ def test_the_written_model_leaves_what_is_claimed(seed, tmp_path):
     assert np.array_equal(pair[1].stamps_ns[at], corrected.stamps_ns)
     error = corrected.values[:, 0] - true[at, 0]
     assert np.std(error - error.mean()) < 0.4
+
+
+def test_what_is_added_to_the_turned_signal_each_axis_has_its_share_of(tmp_path):
+    """The model of a sensor that says its offset on another axis leaves what is claimed, too."""
+    *pair, _, turn = drive(3, 0.0, left=0.05, offset=0.4)
+    lost = slice(1500, 1620)  # a part that nobody has recorded
+    keep = np.delete(np.arange(len(pair[0].stamps_ns)), lost)
+    pair[0] = Samples.of(pair[0].stamps_ns[keep], pair[0].values[keep])
+    found = diagnose(tuple(pair))
+    assert {f.cause for f in found.findings} >= {"misalignment", "offset"}
+    offset = next(f.effect.offset for f in found.findings if f.cause == "offset")
+    assert offset == pytest.approx(0.4, abs=0.02)
+    found.model.save(tmp_path / "turned.yaml")
+    model = SensorModel.load(tmp_path / "turned.yaml")
+    added = [next(e.offset for e in model.axis(axis).effects if e.cause == "offset")
+             for axis in "xyz"]
+    assert np.allclose(turn @ [offset, 0, 0], added, atol=0.02)
+    judged = validate(tuple(pair), model)
+    assert judged.whole_nrmse == pytest.approx(found.extended["nrmse"], rel=0.2)

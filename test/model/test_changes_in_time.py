@@ -9,16 +9,23 @@ from frac_accel.diagnosis import diagnose
 
 N = 8000
 TEMPERATURE = 20 + 15 * np.sin(np.linspace(0, 7, N))
-# By cause, its parameters and what it makes of the motion q at the instants t.
+# By cause (and what is special): parameters, and what it makes of the motion q at the instants t.
 CAUSES = {
     "offset_drift": ({"rate_per_s": -0.02}, lambda t, q: q - 0.02 * t),
     "warm_up_drift": ({"size": 0.3, "time_constant_s": 4.0},
                 lambda t, q: q + 0.3 * (1 - np.exp(-t / 4.0))),
+    "warm_up_drift to zero": (
+        {"size": 0.3, "time_constant_s": 4.0, "settles_at": "zero"},
+        lambda t, q: q + 0.3 * np.exp(-t / 4.0)),
     "thermal_offset": ({"coefficient_per_k": 0.004}, lambda t, q: q + 0.004 * (TEMPERATURE - 25)),
     "offset_step": ({"at_s": 3.0011, "step": 0.04}, lambda t, q: q + 0.04 * (t >= 3.0011)),
     "time_step": ({"at_s": 6.0011, "step_s": 0.003}, None),
     "gain_step": ({"at_s": 5.0011, "ratio": 0.95}, lambda t, q: q * np.where(t < 5.0011, 1, 0.95)),
 }
+
+
+def effect_of(case):
+    return {"cause": case.split()[0], **CAUSES[case][0]}
 
 
 def record(cause, seed, noise=0.01):
@@ -33,16 +40,16 @@ def record(cause, seed, noise=0.01):
 
 @pytest.mark.parametrize("cause", CAUSES)
 def test_simulated_as_it_was_made(cause):
-    parameters, made = CAUSES[cause]
+    made = CAUSES[cause][1]
     t, reference, _ = record(cause, 1)
     if cause == "time_step":
-        made_of = simulate(model({"cause": cause, **parameters}), reference, RATE, axis="x")
+        made_of = simulate(model(effect_of(cause)), reference, RATE, axis="x")
         inside = slice(500, -100)  # the motion from before the record has died away
         expected = record(cause, 1, noise=0.0)[2]
         assert np.std((made_of - expected)[inside]) < 1e-3 * np.std(expected)
         return
     both = [simulate(model(*effects), reference, RATE, axis="x", temperature_c=TEMPERATURE)
-            for effects in ([], [{"cause": cause, **parameters}])]
+            for effects in ([], [effect_of(cause)])]
     np.testing.assert_allclose(both[1], made(t, both[0]), atol=1e-12)
 
 
@@ -52,7 +59,7 @@ def test_corrector_takes_it_out_however_the_stream_is_cut(cause):
     made = samples(t, values)
     results = []
     for cuts in ([0, N], [0, 1, 7, 1500, 1501, 2600, N]):
-        corrector = Corrector(model({"cause": cause, **CAUSES[cause][0]}), RATE, noise_std=0.01)
+        corrector = Corrector(model(effect_of(cause)), RATE, noise_std=0.01)
         parts = []
         for start in range(0, N, 100):
             corrector.set_temperature(TEMPERATURE[start:start + 100].mean())
@@ -87,9 +94,12 @@ def test_found_again_and_nothing_else(cause, seed):
     t, reference, values = record(cause, seed)
     found = diagnose((samples(t, reference), samples(t, values)), model(), "x",
                      (samples(t, t).stamps_ns, TEMPERATURE))
-    assert [finding.cause for finding in found.findings] == [cause]
+    assert [finding.cause for finding in found.findings] == [effect_of(cause)["cause"]]
     finding = found.findings[0]
     for name, value in CAUSES[cause][0].items():
+        if isinstance(value, str):
+            assert getattr(finding.effect, name) == value
+            continue
         assert abs(getattr(finding.effect, name) - value) < 4 * finding.std[name]
         assert finding.std[name] < 0.1 * abs(value)
 

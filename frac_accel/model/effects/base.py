@@ -13,6 +13,7 @@ An effect acts in one of these ways, and overrides what it needs:
 Nothing outside the file of a cause names it: what is particular to it, it declares itself.
 """
 
+import dataclasses
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -138,6 +139,8 @@ class Effect:
     acts_on_slow_motion: ClassVar[bool] = False
     # True for what is so common and so cheap to fit that every search begins with it, too
     everyday: ClassVar[bool] = False
+    # parameters to which what it adds to the output is in proportion, where it only adds
+    adds: ClassVar[tuple[str, ...]] = ()
     # name among the parameters that `identify` finds beside a core
     identified_as: ClassVar[str | None] = None
 
@@ -195,6 +198,13 @@ class Effect:
             One of this cause that acts before.
         """
         return None
+
+    def in_share(self, share):
+        """This effect with a share of what it adds (`adds`), as another axis has it."""
+        return dataclasses.replace(self, **{
+            name: tuple(share * each for each in value) if isinstance(value, tuple)
+            else share * value
+            for name in self.adds for value in [getattr(self, name)]})
 
     def std_of_turn(self, angle_std_deg):
         """Standard uncertainties by parameter of an effect of `of_turn`.

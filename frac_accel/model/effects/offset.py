@@ -13,6 +13,7 @@ class Offset(Effect):
 
     cause = "offset"
     stage = OFFSET
+    adds = ("offset",)
     explanation = "A constant is added to the output."
     everyday = True
     shows_with_time = True

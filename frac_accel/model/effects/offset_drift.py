@@ -16,6 +16,7 @@ class OffsetDrift(Effect):
 
     cause = "offset_drift"
     stage = OFFSET
+    adds = ("rate_per_s", "course")
     explanation = ("The zero of the output drifts with time: the sensor's own, the reference's, or "
                    "gravity along a slow tilt.")
     shows_with_time = True

@@ -15,6 +15,7 @@ class OffsetStep(Effect):
 
     cause = "offset_step"
     stage = OFFSET
+    adds = ("step",)
     explanation = "The zero of the output jumps at one instant."
     shows_with_time = True
     counts_from_start = True

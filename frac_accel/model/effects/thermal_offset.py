@@ -17,6 +17,7 @@ class ThermalOffset(Effect):
 
     cause = "thermal_offset"
     stage = OFFSET
+    adds = ("coefficient_per_k",)
     explanation = "The zero of the output changes with temperature."
     needs_temperature = True
     shows_with_time = True
