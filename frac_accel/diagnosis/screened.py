@@ -15,7 +15,7 @@ from ..identification.fit.uncertainty import by_blocks, sandwich
 from ..model.core.static_force import StaticForce
 from ..model.effects import known_effects
 from ..model.effects.base import CORE
-from ..model.parameters import parameter_fields
+from ..model.parameters import is_varied, parameter_fields
 from .first_order import static_force
 from .problem import acts_on_spring
 
@@ -159,6 +159,7 @@ def _moved(problem, effect):
         if field.metadata.get("list"):
             if getattr(effect, field.name):
                 return "", "1", 1.0
+        if not is_varied(field):
             continue
         null = getattr(axis.core, field.name, None) if field.metadata["null"] == "core" \
             else field.metadata["null"]

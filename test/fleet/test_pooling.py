@@ -62,6 +62,15 @@ def fleet():
     return [fleet_rig.ScreenedVehicle(own, model) for own in vehicles]
 
 
+def test_each_cause_is_screened_by_the_number_that_it_moves():
+    own = fleet_rig.vehicle(np.random.default_rng(6), duration_s=1.0)
+    screened = fleet_rig.ScreenedVehicle(own, SensorModel.from_dict(fleet_rig.model()))
+    rows = screened.drawn(np.random.default_rng(1))["estimates"]
+    moved = {row["cause"]: row["parameter"] for row in rows}
+    assert moved["stiffness_drift"] == "rate_per_s"  # what it reads is a word
+    assert set(fleet_rig.CAUSES) <= set(moved) and all(moved[cause] for cause in fleet_rig.CAUSES)
+
+
 def test_first_order_estimates_are_the_parameters_that_the_rig_had():
     model, size = SensorModel.from_dict(fleet_rig.model()), 2e-3
     own = fleet_rig.vehicle(np.random.default_rng(6), fleet_rig.CAUSES, 3.0)
