@@ -413,13 +413,13 @@ def _classical(record, axis, used, limit):
     record, used = strongest_part(record, AXES.index(axis), used, MOST)
     stds = dict.fromkeys(_CORE, np.inf)
     try:
-        model = identify(dataclasses.replace(record, valid=used), axis, "classical").model
+        found = identify(dataclasses.replace(record, valid=used), axis, "classical")
     except IdentificationError:
         gain = _gain_of_related(record, AXES.index(axis), used)
         if gain is None:
             raise
         return SensorModel(Gain(gain)), stds, {}, None
-    core, seed = SensorModel(model.core), {effect.cause: effect for effect in model.effects}
+    core, seed = SensorModel(found.model.core), found.fitted_effects
 
     def opened(model):
         return {cause: entry.effect

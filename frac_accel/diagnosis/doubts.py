@@ -87,6 +87,8 @@ _PEAKED, _AT_PEAK = 0.1, 10.0
 # Damping ratio above which a mode beside the sensor's own hardly rings, and below which a peak is
 # no smooth filter's.
 _RINGS, _CLEAR_PEAK = 0.3, 0.2
+_LEAST = ("a lead of {:.3g} s, less than a hundredth of a sampling interval: the phase of whatever "
+          "else is not understood")
 _MORE = ("a linear filter would take another {:.0%} of what is left: the linear causes only "
          "imitate the true response")
 # Share of what is left that changes with time from which filters may be a mean of what moves, and
@@ -661,6 +663,14 @@ def within_own_delay(engine, best, effect):
     return ""
 
 
+def least_lead(engine, best, effect):
+    """Why a lead beside a filter is not named that is none of stamps, or ""."""
+    p, lead = engine.problem, -effect.pure_delay_s()
+    if is_link(effect) or not 0 < lead < _NO_LEAD / p.rate or not _filters(engine, best):
+        return ""
+    return _LEAST.format(lead)
+
+
 def delay_of_unseen_core(engine, best):
     """Delay [s] of slow motion in a core that was identified, but resonates beyond all that is
     compared: it may be one of something else, or of none; otherwise 0."""
@@ -712,6 +722,4 @@ def _acausal(engine, best, stds):
     return {cause: f"a lead of {lead:.3g} s beside a filter, less than a sampling interval: a "
                    "digital filter has one of its own"
             for cause, lead in late.items() if own and lead < 1 / p.rate} | {
-        cause: f"a lead of {lead:.3g} s, less than a hundredth of a sampling interval: the phase "
-               "of whatever else is not understood" for cause, lead in late.items()
-        if lead < _NO_LEAD / p.rate}
+        cause: _LEAST.format(lead) for cause, lead in late.items() if lead < _NO_LEAD / p.rate}

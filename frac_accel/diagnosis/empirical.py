@@ -163,7 +163,7 @@ class _Response:
             matrix = np.c_[rows * powers, -rows * wanted[:, None] * powers[:, 1:]]
             right = rows[:, 0] * wanted * powers[:, 0]
             found = _least_squares(matrix, right)
-            denominator = _stable(np.r_[1.0, found[order + 1:]])
+            denominator = _stable(np.r_[1.0, found[order + 1:]], self.band_hz[0] / scale)
             old = np.abs(powers @ denominator)
         rows = (weight / old)[:, None] * (old / (powers @ denominator))[:, None]
         numerator = _least_squares(rows * powers, weight * wanted)
@@ -178,8 +178,10 @@ def _least_squares(matrix, right):
     return np.linalg.lstsq(matrix / size, right, rcond=1e-10)[0] / size
 
 
-def _stable(polynomial):
-    """The polynomial with roots right of the imaginary axis mirrored to the left."""
+def _stable(polynomial, slowest):
+    """The polynomial with roots right of the imaginary axis mirrored to the left, none slower than
+    what was seen: a level that only such a one has is reached long after the record has begun."""
     roots = np.roots(polynomial)
+    roots = roots * np.maximum(slowest / np.maximum(np.abs(roots), 1e-300), 1.0)
     roots = -np.maximum(np.abs(roots.real), 1e-4) + 1j * roots.imag
     return np.real(np.poly(roots)) if len(roots) else polynomial

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..model import SensorModel
 from ..model.core import Gain
-from ..model.effects import Effect, known_effects
+from ..model.effects import Effect, fault_of_reference, known_effects
 from ..model.parameters import parameter_fields
 from .engine import LONG, Engine
 from .gain import gain
@@ -156,9 +156,11 @@ def with_rival(judged, rival):
     """
     if rival is None or rival.rms > _AS_MUCH * judged.extended["rmse"]:
         return judged
-    other = rival.effects
+    faults = [fault_of_reference(effect) for effect in rival.effects.values()]
+    other = {**rival.effects, **{fault.cause: fault for fault in faults if fault}}
     return dataclasses.replace(judged, findings=[
-        _as_open(finding, other[finding.cause], sorted(other.keys() - {finding.cause}))
+        _as_open(finding, other[finding.cause], sorted(
+            rival.effects.keys() - {finding.cause, finding.effect.mirrors}))
         if finding.cause in other else finding for finding in judged.findings])
 
 

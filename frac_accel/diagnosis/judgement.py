@@ -11,13 +11,14 @@ from ..errors import FracAccelError
 from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.core import Oscillator
-from ..model.effects import IDENTIFIED, effect_of, known_effects
+from ..model.effects import IDENTIFIED, effect_of, fault_of_reference, known_effects
 from ..model.effects.base import OFFSET
 from . import courses
 from .doubts import (
     by_what_is_left,
     delay_of_unseen_core,
     doubts_about,
+    least_lead,
     left_open,
     own_delay_s,
     resembles,
@@ -345,18 +346,17 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     beyond = engine.record.beyond(engine.problem.axis)
     if verdict == "consistent" and hides_much(beyond):
         verdict = "undecided"
-    described, kept, after, output = {}, {}, account.after, None
+    described, names, kept, after, output = {}, [], {}, account.after, None
     if verdict in _INCOMPLETE or (strange and not plain):
-        described, after, output = _described(engine, fitted, after, {part for _, part in strange})
+        described, names, after, output = _described(
+            engine, fitted, after, {part for _, part in strange}, {f.cause for f in findings})
         wider, known, after, output = _kept(engine, fitted, widest, after, output)
         if wider is not None:
             # named causes are what they are in the model that is written
             kept = wider.effects
-            findings = [dataclasses.replace(f, effect=kept[f.cause], std=known[f.cause])
-                        if f.cause in kept and f.cause in known else f for f in findings]
+            findings = [_as_kept(f, kept, known) for f in findings]
     named = {f.cause: f.effect for f in findings}
-    effects, late = _of_reference(engine, {**fitted.effects, **named, **(kept or {
-        effect.cause: effect for effect in described})}, named)
+    effects, late = _of_reference(engine, {**fitted.effects, **named, **(kept or described)}, named)
     model = _extended(engine, effects, _stated(engine.problem, fitted, after / account.spread))
     p, spread = engine.problem, account.spread
     floor = _noise_floor(left, noise, account)
@@ -376,7 +376,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     return Diagnosis(
         verdict, reason_of(verdict, account.share, noise, account.accounted, strange, beyond)
         + set_aside(engine.aside, engine.drowned, engine.record.valid)
-        + description_words([] if kept else [*described.values()], unnamed,
+        + description_words([] if kept else names, unnamed,
                             sorted(kept.keys() - fitted.causes), after / spread)
         + hint_words(hint if plain and not strange else 0.0)
         + hidden_words(account.own, account.error) + late + _ahead(p, effects, named),
@@ -482,7 +482,7 @@ def _account(engine, fitted, findings, noise):
     before = _rms(p.measured - baseline.output, rest)
     output = (baseline if fitted.causes == baseline.causes else engine.learnt(fitted)).output
     # what the record shows by itself was not fitted; some of it, such as limits, is simulated
-    shown = [f for f in findings if f.cause not in fitted.effects]
+    shown = [f for f in findings if f.effect.read_off and f.cause not in fitted.effects]
     for finding in shown:
         simulated = finding.effect.simulate(output, p.simulator(p.axis).circumstances)
         # rounded once more, values that noise or other instants have moved are farther off
@@ -591,14 +591,15 @@ def _refitted(engine, best, named, tied):
         named, dropped = named - found.keys(), {**dropped, **found}
 
 
-def _described(engine, fitted, after, parts):
-    """What stands for what no cause explains, with words, the held-out error, and the output with
-    it (None without).
+def _described(engine, fitted, after, parts, named):
+    """What stands for what no cause explains, by cause, with a constant that has no name as it is
+    beside it; its words, the held-out error, and the output with it (None without).
 
     A fitted filter where a part of it is linear, and a fitted curve where one is even or odd.
     """
-    p, described = engine.problem, {}
+    p, described = engine.problem, []
     rest, effects, output = engine.held_out_rows, fitted.effects, fitted.output
+    constants = _constants(effects) - engine.search.base.keys() - named
     for belongs, words, fit in (
             ({"linear"}, "a fitted filter", lambda output: fit_empirical_link(
                 p.measured, output, p.used, rest, p.rate)),
@@ -611,14 +612,18 @@ def _described(engine, fitted, after, parts):
         try:
             found = fit(output)
             more = {**effects, found.effect.cause: found.effect}
+            if constants:  # it makes another level of the motion's mean
+                more = p.fit(more, held=more.keys() - constants).effects
             simulated = p.simulate(more)
         except FracAccelError:
             continue
         error = _rms(p.measured - simulated, rest)
         if found.is_worth_it and error < after:
             effects, output, after = more, simulated, error
-            described[found.effect] = words
-    return described, after, output if described else None
+            described.append(words)
+    return ({cause: effect for cause, effect in effects.items()
+             if effect is not fitted.effects.get(cause)}, described, after,
+            output if described else None)
 
 
 def _kept(engine, fitted, widest, after, output):
@@ -652,14 +657,26 @@ def _of_reference(engine, effects, named):
     """Effects in which what no sensor can do is the reference's, where that is late by the record
     itself and nothing names it; and words."""
     words = ""
-    for cls in known_effects().values() if engine.problem.record.is_reference_late else ():
-        effect = cls.mirrored(effects[cls.mirrors]) if cls.mirrors in effects else None
-        if effect is not None and cls.mirrors not in named:
-            effects = {cause: e for cause, e in effects.items() if cause != cls.mirrors} \
-                | {cls.cause: effect}
-            words += f"; what the sensor shows too early stands in the model as {cls.cause}, so " \
-                "that nothing is taken out of its stamps"
+    for cause, early in [*effects.items()]:
+        fault = fault_of_reference(early)
+        if fault is None or cause in named or effects.get(fault.cause, fault) != fault:
+            continue
+        is_named = fault.cause in named
+        if is_named or engine.problem.record.is_reference_late:
+            effects = {other: e for other, e in effects.items() if other != cause} \
+                | {fault.cause: fault}
+            words += "" if is_named else "; what the sensor shows too early stands in the model " \
+                f"as {fault.cause}, so that nothing is taken out of its stamps"
     return effects, words
+
+
+def _as_kept(finding, kept, known):
+    """A finding as a fit with more causes has it, if it does."""
+    cause = finding.cause if finding.cause in kept else finding.effect.mirrors
+    if cause not in kept or cause not in known:
+        return finding
+    effect = kept[cause] if cause == finding.cause else fault_of_reference(kept[cause])
+    return dataclasses.replace(finding, effect=effect or finding.effect, std=known[cause])
 
 
 def _ahead(problem, effects, named):
@@ -720,7 +737,7 @@ def _moved(engine, best, stds):
         if not g.is_relevant or g.taken < WEIGHS * engine.unexplained(best):
             continue
         words = resembles(engine, best, effect, g.taken) \
-            or within_own_delay(engine, best, effect)
+            or within_own_delay(engine, best, effect) or least_lead(engine, best, effect)
         other = None if words or not entry.is_known else \
             engine.instead_of_moved(best, entry.effect)
         if other:
@@ -728,7 +745,9 @@ def _moved(engine, best, stds):
         if words:
             doubtful[cause] = words
         else:
-            findings.append(Finding(effect, stds[cause], _confidence(farthest**2), [], [
+            mirror = fault_of_reference(effect)  # what no sensor can do
+            findings.append(Finding(mirror or effect, stds[cause], _confidence(farthest**2), [
+                cause] if mirror else [], [
                 f"{farthest:.3g} standard uncertainties from the model's own value",
                 *gain_words(cause, g, np.inf, [])], g))
     return findings, doubtful

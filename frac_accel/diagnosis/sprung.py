@@ -37,7 +37,7 @@ def oscillator_of(record, axis, used):
     resonance = found.parameters["natural_frequency_hz"]
     if not resonance["std"] < _KNOWN * resonance["value"]:
         return None
-    return SensorModel(found.model.core), {each.cause: each for each in found.model.effects}
+    return SensorModel(found.model.core), found.fitted_effects
 
 
 def beside_spring(engine, best):

@@ -68,6 +68,13 @@ class Identification(Shown):
     points: ResponsePoints | None
     frequency_domain: dict | None
 
+    @property
+    def fitted_effects(self):
+        """Effects by cause that were fitted beside the core: a late reference as the sensor's lead.
+        """
+        delay = identified_effect("delay_s", self.parameters["delay_s"]["value"])
+        return {**{effect.cause: effect for effect in self.model.effects}, delay.cause: delay}
+
     def __repr__(self):
         values = ", ".join(f"{name} {entry['value']:.5g} ± {entry['std']:.2g}"
                            for name, entry in list(self.parameters.items())[:4])

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+import rig
 from rig.oscillator import integrate
 from scipy.signal import butter, cont2discrete, lfilter, sosfilt
 from shaken import OVERSAMPLING, measured, shocks
 
 import frac_accel
 from frac_accel import SensorModel
+from frac_accel.io.samples import Samples
 from frac_accel.model.core import Gain
 
 
@@ -85,3 +87,22 @@ def test_damping_that_grows_with_speed_brings_no_fractional_order(seed):
     found = frac_accel.diagnose(pair, sampling_rate_hz=rate, time_limit_s=60.0)
     assert [f.cause for f in found.findings] == ["quadratic_damping"]
     assert abs(found.findings[0].effect.coefficient / coefficient - 1) < 0.01
+
+
+@pytest.mark.parametrize("seed, scatter", [(7, 0.0), (8, 0.0), (8, 0.02), (9, 0.03)])
+def test_what_an_identified_sensor_shows_too_early_is_the_references_doing(seed, scatter):
+    rng, rate = np.random.default_rng([seed, 1]), 200.0
+    core = {"type": "oscillator", "natural_frequency_hz": rng.uniform(20, 35),
+            "damping_ratio": rng.uniform(0.05, 0.15), "damping_order": 1.0, "sensitivity": 1.0}
+    late = rng.uniform(3, 8) / rate
+    excitation = rig.band_noise(rng, rate, 40.0, (0.5, 60.0), 3.0, 1.0)
+    made = rig.simulate_record(rig.Sensor(core, {"reference_delay": {"delay_s": late}}), excitation)
+    values = made.clean + 0.01 * made.clean.std(axis=0) * rng.normal(size=made.clean.shape)
+    stamps = made.sensor_stamps_ns + np.round(
+        1e9 * scatter / rate * rng.normal(size=len(values))).astype(int)
+    found = frac_accel.diagnose((Samples.of(made.stamps_ns, made.reference),
+                                 Samples.of(stamps, values)))
+    [finding] = [f for f in found.findings if not f.effect.read_off]
+    assert finding.cause == "reference_delay"
+    assert abs(finding.effect.delay_s - late) < 4 * finding.std["delay_s"] < 2e-3
+    assert found.model.reference_faults == (finding.effect,)

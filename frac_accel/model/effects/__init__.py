@@ -4,7 +4,6 @@ Third parties add theirs through the entry-point group ``frac_accel.effects``: t
 the cause, its value a subclass of `Effect`. It is loaded when a model or a diagnosis asks for it.
 """
 
-import dataclasses
 import functools
 import importlib
 import pkgutil
@@ -100,8 +99,6 @@ def identified_effect(parameter, value):
 
 
 def fault_of_reference(effect):
-    """The reference's fault that a record cannot tell from an effect of the sensor, or None."""
-    for fault in _own().values():
-        if fault.of_reference and fault.mirrors == effect.cause:
-            return fault(*(-value for value in dataclasses.astuple(effect)))
-    return None
+    """The reference's fault that a record cannot tell from what no sensor can do, or None."""
+    return next((fault.mirrored(effect) for fault in _own().values()
+                 if fault.of_reference and fault.mirrors == effect.cause), None)
