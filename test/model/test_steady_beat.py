@@ -9,15 +9,16 @@ COUNT, RATE = 12_000, 200.0
 TIME = np.arange(COUNT) / RATE
 
 
-def polled(rng, noise, wander_s=0.0):
+def polled(rng, noise, wander_s=0.0, interval=None, fastest_hz=45.0):
     """What a sensor says that another clock reads, the motion that late on average, and the
     interval of the sensor's clock."""
-    frequency = rng.uniform(0.5, 45.0, 60)
+    frequency = rng.uniform(0.5, fastest_hz, 60)
     size, phase = rng.normal(size=60) / np.sqrt(60), rng.uniform(0, 2 * np.pi, 60)
 
     def motion(t):
         return sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in zip(size, frequency, phase))
-    interval = 1 / (RATE * rng.integers(1, 4) + rng.choice([-1, 1]) * rng.uniform(15, 70))
+    interval = interval or 1 / (RATE * rng.integers(1, 4)
+                                + rng.choice([-1, 1]) * rng.uniform(15, 70))
     ticks = (TIME + wander_s * np.sin(0.4 * TIME)) / interval + rng.random()
     values = motion(TIME - interval * (ticks % 1))
     values += noise * values.std() * rng.normal(size=COUNT)
@@ -55,6 +56,18 @@ def test_little_is_left_beside_it():
         if beat is not None:  # where the motion has a line at the beat, none is told
             left.append(np.std(values - output - beat.added) / np.std(values))
     assert len(left) > 7 and np.median(left) < 0.015 and max(left) < 0.1
+
+
+def test_a_clock_slower_than_its_reader_is_told_up_to_the_fastest_motion():
+    rates = []
+    for seed in range(12):
+        rng = np.random.default_rng([73, seed])
+        interval = 1 / (RATE * rng.uniform(0.52, 0.94))
+        values, output, _ = polled(rng, 0.01, interval=interval, fastest_hz=90.0)
+        beat = Beat.of(values, output, np.ones(COUNT, bool))
+        if beat is not None:
+            rates.append(beat.own_rate * interval * RATE)
+    assert len(rates) > 9 and np.max(np.abs(np.array(rates) - 1)) < 1e-6
 
 
 @pytest.mark.parametrize("turns", [0.01, 0.1])

@@ -152,15 +152,15 @@ class Beat(NamedTuple):
             if taken > explained and abs(abs(steady.height) - height) < _ALIKE * height:
                 beat, wanders, words = steady.frequency, steady.frequency_std, steady.words
                 added, explained = steady.added, taken
+                height, height_std = abs(steady.height), steady.height_std
             else:
                 steady = None
         rates = _own_rates(beat, height, height_std, rising)
         if not len(rates):
             return None
         own = float(rates[0]) if len(rates) == 1 else None
-        if steady:
-            height = abs(steady.height)
-            height_std = wanders / own**2 if own else steady.height_std
+        if steady and own:
+            height_std = wanders / own**2
         return cls(beat, wanders, height, height_std, own, explained / total, added, words)
 
 
