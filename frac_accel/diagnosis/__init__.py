@@ -1,5 +1,6 @@
 """What a simulation gets wrong, which cause explains it, and what the extended model gains."""
 
+import contextlib
 import dataclasses
 import functools
 from collections.abc import Callable
@@ -32,6 +33,7 @@ from .leftover import related
 from .read_off import drowned
 from .screened import screened
 from .search import is_nonlinear
+from .slips import are_lost, put_back, slips_of
 from .spikes import spikes, spikes_words
 from .sprung import beside_spring, is_bent, is_better, oscillator_of
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
@@ -60,6 +62,8 @@ _FILTERS = 3
 # Share of the record in which the reference may be clipped: what is found is judged, and what it
 # leaves there shows.
 _CLIPPED_REFERENCE = 0.02
+# Times that a model is identified with lost samples in their places.
+_IDENTIFIED_AGAIN = 2
 # Parameters of a classical core.
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
@@ -161,13 +165,25 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
             passed_on=None if noise and noise.bends else noise, loose=loose,
             in_own_core=[cause for cause, entry in loose.items()
                          if seed is not None and entry.effect.restates_core])
-    begin = engine_of(model, stds, seed)
-    engine, stray = _without_spikes(begin, used, stray, record.reference[:, column], found.step)
-    if stray.any():
-        found.words.append(spikes_words(stray.sum()))
-    engine.spikes, engine.aside = stray, stray | (record.valid & ~moving)
-    engine.at_limit, engine.found = at_limit, found
-    engine.identified = {cause: effect for cause, effect in (seed or {}).items() if effect.everyday}
+    def ready(model, stds, seed):
+        begin = engine_of(model, stds, seed)
+        engine, spiked = _without_spikes(begin, used, stray, record.reference[:, column],
+                                         found.step)
+        engine.spikes, engine.aside = spiked, spiked | (record.valid & ~moving)
+        engine.at_limit, engine.found = at_limit, found
+        engine.identified = {cause: effect for cause, effect in (seed or {}).items()
+                             if effect.everyday}
+        return begin, engine
+    begin, engine = ready(model, stds, seed)
+
+    def identified_without(slips):
+        whole = Record.of(source[0], put_back(source[1], slips), axis, temperature)
+        return _classical(whole, axis, whole.valid & moving_samples(whole, column)[0], limit)
+    begin, engine, (*_, seed, rival), shown = _with_slips(
+        begin, engine, (model, stds, seed, rival), shown, ready,
+        None if is_stated else identified_without)
+    if engine.spikes.any():
+        found.words.append(spikes_words(engine.spikes.sum()))
     _require_relation(engine, axis, seed)
     begin, engine, best = _searched(begin, engine, seed)
     if not is_stated and is_bent(engine, best):
@@ -297,6 +313,41 @@ def _searched(begin, engine, seed):
     best = engine.run(seed)
     return (own_begin, other, own_best) if is_worth_it(best, own_best, courses) \
         else (begin, engine, best)
+
+
+def _with_slips(begin, engine, own, shown, ready, identified_without):
+    """Engine whose every fit has the samples that are lost while the stamps count on, of a model
+    that was identified with these in their places, what begins it, what was identified, and what
+    the record shows by itself; those given where nothing is lost.
+
+    Parameters
+    ----------
+    begin, engine : callable and Engine
+    own : tuple
+        As from `_classical`.
+    shown : dict of str to Effect
+    ready : callable
+        (model, stds, seed) -> what begins an engine, and the engine.
+    identified_without : callable or None
+        (slips) -> as `own`; None where the model is stated.
+    """
+    def unknown(slips):
+        return {cause: effect for cause, effect in slips.items() if cause not in shown}
+    slips, other_begin, other, others = unknown(slips_of(engine)), begin, engine, own
+    with contextlib.suppress(FracAccelError):
+        for _ in range(_IDENTIFIED_AGAIN if slips and identified_without else 0):
+            found = identified_without(slips)
+            (other_begin, other), others = ready(*found[:3]), found
+            again = unknown(slips_of(other, other.problem.simulate(
+                {**other.search.base, **others[2]})))
+            if again in ({}, slips):
+                break
+            slips = again
+    if not slips or not are_lost(other, slips):
+        return begin, engine, own, shown
+    begin = functools.partial(other_begin, base={**other_begin.keywords["base"], **slips})
+    return begin, _beside(begin, other, np.zeros(len(other.wanted), bool)), others, \
+        {**shown, **slips}
 
 
 def _with_a_course(begin, engine, best, seed):

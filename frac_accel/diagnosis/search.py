@@ -122,9 +122,11 @@ class Search:
 
     @property
     def baseline(self):
-        """The model in use, with what is free in every fit but for courses in time."""
+        """The model in use, with what is free in every fit but for what was found before all else:
+        courses in time, and what the record shows by itself."""
         return self.fit({cause: effect for cause, effect in self.base.items()
-                         if cause not in self.courses})
+                         if cause not in self.courses
+                         and (effect.of_reference or not effect.read_off)})
 
     def to_its_best(self, fitted):
         """A fit that what is reported rests on: trials end as soon as they cannot win."""

@@ -56,7 +56,8 @@ class Draws:
     def _fixed(self, field):
         """A count, a word or what no fit varies."""
         if field.metadata.get("fixed"):
-            return field.default if field.default is not dataclasses.MISSING else 1.0
+            return field.default if field.default is not dataclasses.MISSING \
+                else min(1.0, float(np.mean(span(field))))
         if field.metadata.get("choices"):
             return str(self.rng.choice(field.metadata["choices"]))
         low, high = span(field)

@@ -199,6 +199,23 @@ class Effect:
         """
         return None
 
+    @classmethod
+    def of_slips(cls, at_s, counts, interval_s, samples):
+        """The effect that says that samples are lost though the stamps count on, or None.
+
+        Parameters
+        ----------
+        at_s : ndarray, shape (m,)
+            Stamps after the record's start that the first samples after a loss carry [s].
+        counts : ndarray, shape (m,)
+            Samples that each has lost.
+        interval_s : float
+            Sampling interval [s].
+        samples : int
+            That are there.
+        """
+        return None
+
     def in_share(self, share):
         """This effect with a share of what it adds (`adds`), as another axis has it."""
         return dataclasses.replace(self, **{
