@@ -30,10 +30,10 @@ from .finding import Diagnosis, Finding, insufficient
 from .flat import flat_instead, with_rival
 from .judgement import judge
 from .leftover import related
+from .off_clock import are_lost, clock_of, put_back, slips_of
 from .read_off import drowned
 from .screened import screened
 from .search import is_nonlinear
-from .slips import are_lost, put_back, slips_of
 from .spikes import spikes, spikes_words
 from .sprung import beside_spring, is_bent, is_better, oscillator_of
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
@@ -344,10 +344,26 @@ def _with_slips(begin, engine, own, shown, ready, identified_without):
                 break
             slips = again
     if not slips or not are_lost(other, slips):
+        if identified_without:
+            begin, engine, own = _on_its_clock(begin, engine, own, ready, identified_without)
         return begin, engine, own, shown
     begin = functools.partial(other_begin, base={**other_begin.keywords["base"], **slips})
     return begin, _beside(begin, other, np.zeros(len(other.wanted), bool)), others, \
         {**shown, **slips}
+
+
+def _on_its_clock(begin, engine, own, ready, identified_without):
+    """Engine of a model that was identified with the stamps that a clock would have given which is
+    not off, what begins it, and what was identified; those given where no clock is off, or that
+    leaves more. Arguments as those of `_with_slips`."""
+    clock, left = clock_of(engine)
+    if clock:
+        with contextlib.suppress(FracAccelError):
+            found = identified_without(clock)
+            other_begin, other = ready(*found[:3])
+            if clock_of(other)[1] < left:
+                return other_begin, other, found
+    return begin, engine, own
 
 
 def _with_a_course(begin, engine, best, seed):

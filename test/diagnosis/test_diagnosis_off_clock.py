@@ -1,4 +1,5 @@
-"""Samples that are lost while the stamps count on are found, counted and put in their places."""
+"""Samples that are lost while the stamps count on, and clocks that are off, in records without a
+model: what is identified is the sensor, and the clock has the name."""
 
 import numpy as np
 import pytest
@@ -46,6 +47,19 @@ def test_losses_that_no_stamp_shows_are_found_where_they_are(seed, lost):
     assert found.extended["nrmse"] < 0.015 < 0.1 < found.baseline["nrmse"]
     # the model that is written does the same
     assert validate(pair, found.model).whole_nrmse < 0.03
+
+
+@pytest.mark.parametrize("seed, skew_ppm", [(5, 300.0), (6, 100.0), (7, -200.0)])
+def test_a_clock_that_is_off_does_not_bend_what_is_identified(seed, skew_ppm):
+    (reference, sensor), _, _ = made(seed, 0)
+    after_ns = sensor.stamps_ns - sensor.stamps_ns[0]
+    stamps = sensor.stamps_ns - np.round(1e-6 * skew_ppm * after_ns).astype(int)
+    found = diagnose((reference, sensor._replace(stamps_ns=stamps)), time_limit_s=60)
+    assert found.verdict == "explained"
+    [finding] = found.findings
+    assert finding.cause == "clock_skew"
+    assert abs(finding.effect.skew_ppm - skew_ppm) < 0.5
+    assert found.extended["nrmse"] < 0.03
 
 
 @pytest.mark.thorough

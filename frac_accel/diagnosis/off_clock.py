@@ -1,4 +1,4 @@
-"""Samples that are lost although the stamps count on: from each on the sensor is ahead for good."""
+"""Samples that are lost although the stamps count on, and clocks that are off."""
 
 import numpy as np
 
@@ -19,6 +19,8 @@ _FOR_A_LOSS, _PASSES = 30.0, 4
 # Share of the residual's power that the path may leave of what one shift does, to be worth a look;
 # and that a fit with the losses may leave of what is common, or one clock that is off or jumps.
 _WORTH_A_LOOK, _LESS = 0.8, 0.5
+# Share of the output's power that is left where a clock may have bent the identified model.
+_BENT = 1e-3
 # Intervals by which what is left between two losses may be late (RMS, by the power of its slope).
 _WHOLE = 0.1
 
@@ -66,12 +68,31 @@ def slips_of(engine, output=None):
     return {effect.cause: effect for effect in found if effect is not None}
 
 
-def put_back(samples, slips):
-    """`Samples` with the stamps that they would have if these had not counted on."""
+def clock_of(engine):
+    """The cause, as {cause: effect}, of a clock that is off, or jumps once, where that takes most
+    of what is left, and what all then leaves; empty, and what is left, where none does."""
+    p, bare = engine.problem, engine.everyday()
+    power = np.sum((p.measured - p.measured[p.used].mean())[p.used]**2)
+    if len(p.time) >= _LONGEST or bare.cost < _BENT * power or p.limit.ends_search():
+        return {}, bare.cost
+    fits = [fit for fit in _clocks(engine, bare) if fit.cost < _LESS * bare.cost]
+    if not fits:
+        return {}, bare.cost
+    fit = min(fits, key=lambda fit: fit.cost)
+    return {cause: effect for cause, effect in fit.effects.items()
+            if cause not in bare.effects and _is_clock(effect)}, fit.cost
+
+
+def put_back(samples, clock):
+    """`Samples` with the stamps that they would have without some causes of the clock."""
     after_s = 1e-9 * (samples.stamps_ns - samples.stamps_ns[0])
-    moved = sum(np.where(after_s >= at_s, round(-1e9 * step_s), 0)
-                for effect in slips.values() for at_s, step_s in effect.time_steps())
-    return samples._replace(stamps_ns=samples.stamps_ns + moved)
+    moved_s = np.zeros(len(after_s))
+    for effect in clock.values():
+        moved_s += (effect.clock_ratio() - 1) * after_s
+        for at_s, step_s in effect.time_steps():
+            moved_s -= np.where(after_s >= at_s, step_s, 0.0)
+    return samples._replace(
+        stamps_ns=samples.stamps_ns + np.round(1e9 * moved_s).astype(np.int64))
 
 
 def are_lost(engine, slips):
@@ -91,7 +112,11 @@ def _clocks(engine, bare):
     search = engine.search
     return search.fit_all([search.begun(bare, cause, begin)
                            for _, cause, begin in search.screen(bare)
-                           if begin.common_to_axes and begin.shows_with_time])
+                           if _is_clock(begin)])
+
+
+def _is_clock(effect):
+    return effect.common_to_axes and effect.shows_with_time
 
 
 def _path(errors):
