@@ -374,7 +374,7 @@ def test_a_stopped_command_cleans_up(place, long_bag, number, output):
     wait_for(lambda: leftovers(place))
     process.send_signal(number)
     words = process.communicate(timeout=60)[1]
-    assert process.returncode == 128 + number
+    assert process.returncode == 128 + number, words
     assert "Traceback" not in words and len(words.strip().splitlines()) == 1
     assert content(place) == before
 
