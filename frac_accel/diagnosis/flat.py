@@ -11,6 +11,7 @@ from ..model.effects import Effect, fault_of_reference, known_effects
 from ..model.parameters import parameter_fields
 from .engine import LONG, Engine
 from .gain import gain
+from .off_clock import is_clock
 from .stretches import strongest_part
 
 # Links that are fitted, and the share of an oscillator's residual power that one may leave: by
@@ -77,8 +78,7 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
     links = [cause for cause, effect in known_effects().items()
              if not effect.read_off and (not effect.of_reference or effect.acts_on_slow_motion)
              and effect.transfer_function is not Effect.transfer_function]
-    clocks = [cause for cause, effect in known_effects().items()
-              if effect.common_to_axes and effect.shows_with_time]
+    clocks = [cause for cause, effect in known_effects().items() if is_clock(effect)]
     own = Engine(record, column, model, used, opened(model), [*links, *clocks], limit=limit)
     before = own.search.fit({**own.search.base, **seed})
     before = own.search.prune(_with_what_stands_alone(own, _with_clock(own, before, clocks)),

@@ -80,7 +80,7 @@ def clock_of(engine):
         return {}, bare.cost
     fit = min(fits, key=lambda fit: fit.cost)
     return {cause: effect for cause, effect in fit.effects.items()
-            if cause not in bare.effects and _is_clock(effect)}, fit.cost
+            if cause not in bare.effects and is_clock(effect)}, fit.cost
 
 
 def put_back(samples, clock):
@@ -112,10 +112,11 @@ def _clocks(engine, bare):
     search = engine.search
     return search.fit_all([search.begun(bare, cause, begin)
                            for _, cause, begin in search.screen(bare)
-                           if _is_clock(begin)])
+                           if is_clock(begin)])
 
 
-def _is_clock(effect):
+def is_clock(effect):
+    """Whether an effect, or its class, is of the sensor's clock."""
     return effect.common_to_axes and effect.shows_with_time
 
 
