@@ -6,6 +6,7 @@ from scipy.signal import lfilter
 from ..budget.blocks import Blocks
 from ..budget.modulated import Modulated, cosines
 from ..model.effects import known_effects
+from ..model.effects.base import OFFSET
 from ..model.effects.course import KNOTS
 from .finding import Finding
 from .gain import certainty, gain
@@ -23,12 +24,17 @@ _BETTER = 0.02
 _LESS, _AS_GOOD = 0.6, 1.05
 # Share of what a cause adds (power) that a course must describe for it to be one.
 _SLOW = 0.8
-# Square of a course's correlation with the motion's own from which it may be that.
-_ALIKE = 0.92
+# Square of a course's correlation with the motion's own, or with what its level brings, from which
+# it may be that.
+_SAME_COURSE = 0.92
+# Share of a level's mean that its scatter must be to bring anything.
+_VARIES = 0.1
 # Share of what the record knows of a course, everywhere, with which it is held at none.
 _HELD = 1e-4
-# Shares of a heat or a charge that stay from one instant of a course to the next.
-_KEEPS = (0.5, 0.75, 0.9)
+# Shares of a heat, a charge or a level that stay from one instant of a course to the next.
+_KEEPS = (0.0, 0.5, 0.75, 0.9, 0.95)
+# Share of a level's mean below which its logarithm is not followed.
+_LEVEL_FLOOR = 1e-3
 # Share of what is left that may still change with time, in the part of the budget that is its own.
 _SAME_KIND = 0.3
 
@@ -92,8 +98,9 @@ def course_of(engine, best):
         if min(others) < _CLEARLY * left:
             continue
         effect = _through(p, cls, before, target, waves)
-        if not _follows(_values(effect), _mean(cls.column(before)**2, p.used),
-                        _measures(before, p.used, _adds(cls))):
+        values, weight = _values(effect), _mean(cls.column(before)**2, p.used)
+        if _as_level(values, weight, before, p.used) < _SAME_COURSE \
+                and not (_adds(cls) and _as_motion(values, weight, before, p.used)):
             found.append((left, cause, effect))
     return {cause: effect for _, cause, effect in sorted(found, key=lambda each: each[:2])[:1]}
 
@@ -207,14 +214,31 @@ def _values(effect):
     return np.array(effect.course) + effect.rate_per_s * np.array(effect.course_at_s)
 
 
-def _measures(motion, used, adds):
-    """What of the motion is slow, too: its level and power, what that warms or charges, and, where
-    a course `adds` to it, itself, how it changes and adds up; each of shape (KNOTS,)."""
+def _as_motion(course, weight, motion, used):
+    """Whether a course that is added may be what is lost of slow motion: itself, how it changes and
+    adds up."""
     slow = _mean(motion, used)
-    power = _mean((motion - motion[used].mean())**2, used)
-    warmed = [lfilter([1 - keeps], [1, -keeps], power) for keeps in _KEEPS]
-    own = [slow, np.gradient(slow), np.cumsum(slow - slow.mean())] if adds else []
-    return [*own, np.sqrt(power), power, *warmed]
+    return any(_alike(course, weight, each) > _SAME_COURSE
+               for each in (slow, np.gradient(slow), np.cumsum(slow - slow.mean())))
+
+
+def _as_level(course, weight, motion, used):
+    """Square of a course's largest correlation with what the motion's level may bring.
+
+    That is the mean, the logarithm or the square root of its size or power, or of its slope's, at
+    once or as it warms and charges something: what vibration is rectified to, a gain that falls
+    with it, a sensor that it heats.
+    """
+    swing = motion - motion[used].mean()
+    found = 0.0
+    for size in (abs(swing), abs(np.gradient(swing))):
+        for level in (_mean(size, used), _mean(size**2, used)):
+            for keeps in _KEEPS:
+                after = lfilter([1 - keeps], [1, -keeps], level, zi=[keeps * level[0]])[0]
+                if np.std(after) > _VARIES * np.mean(after):
+                    found = max(found, *(_alike(course, weight, each) for each in (
+                        after, np.sqrt(after), np.log(after + _LEVEL_FLOOR * after.mean()))))
+    return found
 
 
 def _mean(values, used):
@@ -224,14 +248,37 @@ def _mean(values, used):
     return np.add.reduceat(values * used, edges) / count
 
 
-def _follows(course, weight, measures):
-    """Whether a course may be the motion's own: what is lost of slow motion, or comes with its
-    level. It counts by the weight that it is known with."""
+def _alike(course, weight, measure):
+    """Square of the correlation of a course with a measure; it counts by the weight that it is
+    known with."""
     def moving(values):
         return np.sqrt(weight) * (values - np.average(values, weights=weight))
-    course = moving(course)
-    return any((course @ each)**2 > _ALIKE * (course @ course) * (each @ each)
-               for each in map(moving, measures) if each.any())
+    course, measure = moving(course), moving(measure)
+    size = (course @ course) * (measure @ measure)
+    return (course @ measure)**2 / size if size > 0 else 0.0
+
+
+def with_level(engine, best, added):
+    """Causes that change with time, or once, as the motion's level does, in words by cause: what
+    follows the motion and what follows time are the same there."""
+    p, found = engine.problem, {}
+    for cause, change in added.items():
+        effect = best.effects[cause]
+        if not effect.shows_with_time or effect.everyday or effect.needs_temperature:
+            continue
+        before = best.simulated - change
+        column = np.ones(len(change)) if effect.stage == OFFSET \
+            else before - before[p.used].mean()
+        weight = _mean(column**2, p.used)
+        course = _mean(change * column, p.used) / np.maximum(weight, 1e-300)
+        told = np.interp(np.arange(len(change)), np.linspace(0, len(change), KNOTS), course)
+        if np.sum((change - told * column)[p.used]**2) > (1 - _SLOW) * np.sum(change[p.used]**2):
+            continue
+        alike = _as_level(course, weight, before, p.used)
+        if alike > _SAME_COURSE:
+            found[cause] = f"the motion's level changes in the same way (correlation " \
+                           f"{np.sqrt(alike):.2f}): it may follow the motion, not time"
+    return found
 
 
 def is_worth_it(before, after, courses):

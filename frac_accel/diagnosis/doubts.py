@@ -9,6 +9,7 @@ from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.core import Oscillator
 from ..model.effects.base import CROSS_AXIS, OFFSET, Effect
+from .courses import with_level
 from .engine import LONG, WEIGHS
 from .gradual import gradual
 from .names import cancelling, undetermined
@@ -139,6 +140,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
     for cause, words in {**by_what_is_left(engine, best, takes, left),
                          **_acausal(engine, best, stds), **_of_the_model(engine, best),
                          **_as_slow(engine, best, added, takes),
+                         **with_level(engine, best, added),
                          **gradual(engine, best, gains)}.items():
         doubts.setdefault(cause, words)
     for pair in cancelling(added):

@@ -60,6 +60,11 @@ class Blocks:
                      for field in dataclasses.fields(cls)[:-1]),
                    float(np.mean([part.excitation for part in parts])))
 
+    def last(self, count):
+        """So many of them."""
+        return Blocks(*(getattr(self, field.name)[-count:]
+                        for field in dataclasses.fields(self)[:-1]), self.excitation)
+
     def merged(self, every):
         """Sums over so many blocks at a time; what is left over at the end is dropped."""
         count = len(self.power) // every

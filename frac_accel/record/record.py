@@ -7,8 +7,9 @@ import numpy as np
 
 from ..errors import FracAccelError
 from ..model import AXES
+from ..shown import several
 from .beyond import beyond
-from .clock import usable
+from .clock import in_order, usable
 from .glitches import glitch_words, glitches, is_cut_off
 from .gravity import STANDARD_GRAVITY, gravity_words
 from .held import first_of_held
@@ -274,13 +275,17 @@ class Record:
             leave gaps ten times as long as all samples, or no time in common with the other;
             or no temperature is finite.
         """
+        (reference, late), (sensor, late_too) = in_order(reference), in_order(sensor)
+        words = [f"{several(number, 'sample')} of the {name} came after a later one: all are put "
+                 "in the order of their stamps"
+                 for name, number in (("reference", late), ("sensor", late_too)) if number]
         record = cls._paired(reference, sensor, axis, temperature)
-        faulty, words = record._reference_alone(reference, AXES.index(axis))
-        if not faulty.any():
-            return record
-        values = np.where(faulty[:, None], np.nan, reference.values)
-        again = cls._paired(reference._replace(values=values), sensor, axis, temperature)
-        return dataclasses.replace(again, words=(*words, *again.words))
+        faulty, more = record._reference_alone(reference, AXES.index(axis))
+        if faulty.any():
+            values = np.where(faulty[:, None], np.nan, reference.values)
+            record = cls._paired(reference._replace(values=values), sensor, axis, temperature)
+        words += more
+        return dataclasses.replace(record, words=(*words, *record.words)) if words else record
 
     def _reference_alone(self, reference, column):
         """Mask of the reference's samples that are its own fault, and words."""

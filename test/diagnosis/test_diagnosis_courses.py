@@ -101,3 +101,20 @@ def test_a_zero_that_follows_the_vibration_does_not_drift(seed):
     record = sampled_pair(rng, (motion, output), FINER, RATE, 0.005)
     found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
     assert "offset_drift" not in {finding.cause for finding in found.findings}
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_gain_that_falls_with_the_level_does_not_drift(seed):
+    """Slowly, and with what a first-order memory keeps of the slope's size."""
+    rng = np.random.default_rng(seed)
+    fine = FINER * RATE
+    time = np.arange(round(fine * DURATION_S)) / fine
+    frequency = 2 + 33 * time / time[-1]
+    motion = np.sin(2 * np.pi * np.cumsum(frequency) / fine) * frequency**rng.uniform(0.5, 2)
+    motion /= motion.std()
+    slope = np.abs(np.gradient(motion))
+    slow = sosfilt(butter(1, 0.02, fs=fine, output="sos"), slope / slope.std())
+    record = sampled_pair(rng, (motion, motion / (1 + rng.uniform(0.1, 0.4) * slow)), FINER, RATE,
+                          0.005)
+    found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
+    assert "gain_drift" not in {finding.cause for finding in found.findings}

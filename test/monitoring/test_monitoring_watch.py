@@ -120,3 +120,18 @@ def test_a_trial_is_rarely_won_by_a_model_that_is_no_better():
             trial.add(1.0, np.exp(0.05 * rng.normal()))
         won += trial.verdict == "won"
     assert won == 0
+
+
+@pytest.mark.parametrize("seed, effects", [
+    (1019, {"tone_interference": {"frequency_hz": 31.0, "amplitude": 0.1}}),
+    (1018, {"dead_zone": {"half_width": 0.05}})])
+def test_a_growing_change_that_no_direction_shows_is_dated_by_its_size(model, seed, effects):
+    """Its power grows with the square of time: it shows late, and began before."""
+    at_s = 400.0 + np.random.default_rng(seed).uniform(0, 60)
+    drive = ChangingDrive(seed, effects, at_s, 60.0)
+    watch, noticed = watched(drive, model)
+    assert at_s < noticed < at_s + 70
+    change = watch.changed
+    assert change.is_gradual
+    assert drive.since_start_s(change.low_ns) <= at_s <= drive.since_start_s(change.high_ns)
+    assert change.high_ns - change.low_ns < 10e9
