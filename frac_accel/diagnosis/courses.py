@@ -26,7 +26,7 @@ _LESS, _AS_GOOD = 0.6, 1.05
 _SLOW = 0.8
 # Square of a course's correlation with the motion's own, or with what its level brings, from which
 # it may be that.
-_SAME_COURSE = 0.92
+_ALIKE = 0.92
 # Share of a level's mean that its scatter must be to bring anything.
 _VARIES = 0.1
 # Share of what the record knows of a course, everywhere, with which it is held at none.
@@ -99,7 +99,7 @@ def course_of(engine, best):
             continue
         effect = _through(p, cls, before, target, waves)
         values, weight = _values(effect), _mean(cls.column(before)**2, p.used)
-        if _as_level(values, weight, before, p.used) < _SAME_COURSE \
+        if _as_level(values, weight, before, p.used) < _ALIKE \
                 and not (_adds(cls) and _as_motion(values, weight, before, p.used)):
             found.append((left, cause, effect))
     return {cause: effect for _, cause, effect in sorted(found, key=lambda each: each[:2])[:1]}
@@ -218,7 +218,7 @@ def _as_motion(course, weight, motion, used):
     """Whether a course that is added may be what is lost of slow motion: itself, how it changes and
     adds up."""
     slow = _mean(motion, used)
-    return any(_alike(course, weight, each) > _SAME_COURSE
+    return any(_alike(course, weight, each) > _ALIKE
                for each in (slow, np.gradient(slow), np.cumsum(slow - slow.mean())))
 
 
@@ -275,7 +275,7 @@ def with_level(engine, best, added):
         if np.sum((change - told * column)[p.used]**2) > (1 - _SLOW) * np.sum(change[p.used]**2):
             continue
         alike = _as_level(course, weight, before, p.used)
-        if alike > _SAME_COURSE:
+        if alike > _ALIKE:
             found[cause] = f"the motion's level changes in the same way (correlation " \
                            f"{np.sqrt(alike):.2f}): it may follow the motion, not time"
     return found
