@@ -26,7 +26,7 @@ _LESS, _AS_GOOD = 0.6, 1.05
 _SLOW = 0.8
 # Square of a course's correlation with the motion's own, or with what its level brings, from which
 # it may be that.
-_ALIKE = 0.92
+_ALIKE = 0.9
 # Share of a level's mean that its scatter must be to bring anything.
 _VARIES = 0.1
 # Share of what the record knows of a course, everywhere, with which it is held at none.
@@ -99,7 +99,7 @@ def course_of(engine, best):
             continue
         effect = _through(p, cls, before, target, waves)
         values, weight = _values(effect), _mean(cls.column(before)**2, p.used)
-        if _as_level(values, weight, before, p.used) < _ALIKE \
+        if _as_level(values, weight, before, p.used, waves) < _ALIKE \
                 and not (_adds(cls) and _as_motion(values, weight, before, p.used)):
             found.append((left, cause, effect))
     return {cause: effect for _, cause, effect in sorted(found, key=lambda each: each[:2])[:1]}
@@ -222,13 +222,19 @@ def _as_motion(course, weight, motion, used):
                for each in (slow, np.gradient(slow), np.cumsum(slow - slow.mean())))
 
 
-def _as_level(course, weight, motion, used):
+def _as_level(course, weight, motion, used, waves=None):
     """Square of a course's largest correlation with what the motion's level may bring.
 
     That is the mean, the logarithm or the square root of its size or power, or of its slope's, at
     once or as it warms and charges something: what vibration is rectified to, a gain that falls
-    with it, a sensor that it heats.
+    with it, a sensor that it heats. A course of few half waves can only follow what they show
+    of it.
     """
+    def shown(values):
+        if waves is None:
+            return values
+        columns, root = _columns(np.linspace(0, 1, KNOTS), range(waves + 1)), np.sqrt(weight)
+        return columns @ np.linalg.lstsq(columns * root[:, None], values * root, rcond=None)[0]
     swing = motion - motion[used].mean()
     found = 0.0
     for size in (abs(swing), abs(np.gradient(swing))):
@@ -236,7 +242,7 @@ def _as_level(course, weight, motion, used):
             for keeps in _KEEPS:
                 after = lfilter([1 - keeps], [1, -keeps], level, zi=[keeps * level[0]])[0]
                 if np.std(after) > _VARIES * np.mean(after):
-                    found = max(found, *(_alike(course, weight, each) for each in (
+                    found = max(found, *(_alike(course, weight, shown(each)) for each in (
                         after, np.sqrt(after), np.log(after + _LEVEL_FLOOR * after.mean()))))
     return found
 
