@@ -8,6 +8,7 @@ from frac_accel import Corrector, LiveSimulator
 from frac_accel.errors import FracAccelError
 from frac_accel.model import SensorModel
 from frac_accel.model.core import Oscillator
+from frac_accel.streaming.history import LONGEST
 
 RATE = 1000.0
 START = 1_700_000_000_000_000_000
@@ -114,6 +115,19 @@ def check_case(seed):
 @pytest.mark.parametrize("seed", range(16))
 def test_any_split_is_bit_identical(seed):
     check_case(seed)
+
+
+def test_any_split_of_a_long_memory_is_bit_identical():
+    """Single samples and blocks in turn, beyond where the motion before the start is looked for."""
+    rng = np.random.default_rng(5)
+    model, n = oscillator(0.6), 2 * LONGEST
+    model.metadata["covariance"] = {"parameters": ["damping_ratio", "damping_order"],
+                                    "matrix": [[1e-4, 0.0], [0.0, 1e-4]]}
+    stream = START + np.arange(n) * 1_000_000, rng.normal(size=(n, 3)), np.full((n, 3), 1e-4)
+    edges = np.unique(np.r_[np.minimum(np.cumsum(rng.choice([1, 1, 1, 2, 5, 200], n)), n), 0, n])
+    whole = run(Corrector(model, RATE), *stream, [0, n])
+    assert len(whole[0]) > LONGEST
+    assert same(whole, run(Corrector(model, RATE), *stream, edges))
 
 
 def test_invariant_holds_after_every_block():
