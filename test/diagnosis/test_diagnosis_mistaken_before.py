@@ -18,8 +18,7 @@ pytestmark = pytest.mark.long
     # coarse rounding follows the motion, and was taken for more
     (820028, ["ac_coupling", "quantization"]),
     (820032, ["fractional_damping", "quantization"]),
-    pytest.param(820058, ["offset", "quantization"], marks=pytest.mark.xfail(
-        reason="on some processors the offset ties with a warm_up_drift and is suspected only")),
+    (820058, ["offset", "quantization"]),
     # a scatter of 0.06 % of an interval passed for rounding
     (1000003, ["timestamp_jitter"]),
 ])
