@@ -5,6 +5,7 @@ import collections
 import numpy as np
 
 from ..io.bag import cdr
+from ..record.ordering import Reordering
 from ..streaming.batches import restamped
 from ..streaming.waiting_messages import WaitingMessages
 
@@ -19,7 +20,11 @@ def temperatures_of(reader, topic, model):
 
 
 class Sink:
-    """Runs raw blocks through the corrector and writes what becomes ready."""
+    """Runs raw blocks through the corrector and writes what becomes ready.
+
+    Samples that the recorder has mixed are put in the order of their stamps first. A message's log
+    time is then that of the latest that came before it in this order, so that the order stays.
+    """
 
     def __init__(self, corrector, writer, type_name, topic, temperatures, keeps=False):
         self._keeps, self._raw, self._taken, self._ready = keeps, [], [], []
@@ -27,7 +32,8 @@ class Sink:
         self._temperatures = collections.deque(temperatures)
         self._type, self._topic = type_name, topic
         self._waiting = WaitingMessages(type_name)
-        self._frame = ""
+        self._frame, self._log = "", 0
+        self._order = Reordering()
 
     def add(self, block, messages):
         if self._type == cdr.POINT_CLOUD2:
@@ -38,10 +44,20 @@ class Sink:
                 self._keep_raw(samples)
                 self._write_cloud(self._corrector.process(samples.stamps_ns, samples.values))
             return
-        samples = block.samples()
+        self._take(*self._order.add(block.samples(), messages, block.log_times_ns.tolist()))
+
+    @property
+    def late(self):
+        """Samples that came after a later one."""
+        return self._order.late
+
+    def _take(self, samples, messages, logs):
+        if not logs:
+            return
+        logs = np.maximum.accumulate([max(logs[0], self._log), *logs[1:]])
+        self._log, start = logs[-1], 0
         self._keep_raw(samples)
-        self._waiting.add(messages, block.log_times_ns.tolist())
-        logs, start = block.log_times_ns, 0
+        self._waiting.add(messages, logs.tolist())
         while start < len(logs):
             self._tell_temperature(logs[start])
             stop = (int(np.searchsorted(logs, self._temperatures[0][0])) if self._temperatures
@@ -76,6 +92,9 @@ class Sink:
         return restamped(cdr.Samples.concatenate(self._raw), self._taken), index, corrected
 
     def finish(self):
+        held = self._order.rest()
+        if held:
+            self._take(*held)
         rest = self._corrector.finish()
         (self._write_cloud if self._type == cdr.POINT_CLOUD2 else self._write)(rest)
 

@@ -78,7 +78,7 @@ def run(arguments):
         if not counters["given"]:
             raise BagError(f"{arguments.bag}: topic {arguments.sensor}: nothing could be corrected "
                            f"of {counters['samples']} samples: {fates(counters)}")
-    warnings = [*reader.warnings, *_notes(corrector, arguments.bag)]
+    warnings = [*reader.warnings, *_notes(corrector, arguments.bag, sink.late)]
     for warning in warnings:
         print(f"warning: {warning}")
     summary = corrector.design.summary()
@@ -104,13 +104,16 @@ def run(arguments):
                                 "filters": summary, "warnings": warnings})
 
 
-def _notes(corrector, bag):
+def _notes(corrector, bag, late):
     """What a user must know of a correction."""
+    from ..record.ordering import late_words
     notes = [f"the variance is without the model's parameter uncertainty: {note}"
              for note in dict.fromkeys(corrector.design.notes) if note]
     if corrector.batch_size:
         notes.append(f"the samples come {corrector.batch_size:.4g} at a time with one stamp: their "
                      "instants are taken as uniform")
+    if late:
+        notes.append(late_words(late, "sensor"))
     source = corrector.model.metadata.get("provenance")
     if corrector.model.of_one_record and not (
             isinstance(source, dict) and source.get("bag") == printable(Path(bag).name)):

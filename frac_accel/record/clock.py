@@ -58,9 +58,6 @@ _LATE = 3.0
 _LONG_STEP = 95
 # What a robust deviation is multiplied by to be a standard deviation of normal scatter.
 _NORMAL = 1.4826
-# Places by which a recorder may have mixed samples, and share of the usual step below which two of
-# them are too close together for that.
-_MIXED, _TOO_CLOSE = 64, 0.6
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -180,27 +177,6 @@ def usable(samples):
         if _batches((stamps[every] - stamps[0]) * 1e-9) is not None:
             return every
     return advances
-
-
-def in_order(samples):
-    """Samples in the order of their stamps, and how many of them came after a later one.
-
-    That is done where a recorder has mixed them only: none is far from its place, and once they are
-    in order they are no closer together than others. Behind a clock that was set back they are.
-    """
-    stamps = samples.stamps_ns
-    steps = np.diff(stamps)
-    back = int(np.count_nonzero(steps < 0))
-    if not back:
-        return samples, 0
-    order = np.argsort(stamps, kind="stable")
-    steps = np.diff(stamps[order])
-    if np.max(np.abs(order - np.arange(len(order)))) > _MIXED \
-            or np.count_nonzero(steps < _TOO_CLOSE * np.median(steps)) > back / 2:
-        return samples, 0
-    late = int(np.count_nonzero(stamps < np.maximum.accumulate(stamps)))
-    return samples._replace(stamps_ns=stamps[order], values=samples.values[order],
-                            variance=samples.variance[order]), late
 
 
 def merged(seconds, *columns):

@@ -7,13 +7,13 @@ import numpy as np
 
 from ..errors import FracAccelError
 from ..model import AXES
-from ..shown import several
 from .beyond import beyond
-from .clock import in_order, usable
+from .clock import usable
 from .glitches import glitch_words, glitches, is_cut_off
 from .gravity import STANDARD_GRAVITY, gravity_words
 from .held import first_of_held
 from .instants import put_on_instants
+from .ordering import in_order, late_words
 from .pairing import FEWEST, by_slots, by_stamps, same_clock, share_instants
 from .relation import clock_offset, refined
 from .resampling import filled, guessed, within
@@ -276,8 +276,7 @@ class Record:
             or no temperature is finite.
         """
         (reference, late), (sensor, late_too) = in_order(reference), in_order(sensor)
-        words = [f"{several(number, 'sample')} of the {name} came after a later one: all are put "
-                 "in the order of their stamps"
+        words = [late_words(number, name)
                  for name, number in (("reference", late), ("sensor", late_too)) if number]
         record = cls._paired(reference, sensor, axis, temperature)
         faulty, more = record._reference_alone(reference, AXES.index(axis))

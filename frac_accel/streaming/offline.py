@@ -6,6 +6,7 @@ from typing import Any
 
 from ..io.samples import Samples
 from ..model import SensorModel
+from ..record.ordering import in_order
 from ..record.sources import is_bag, samples_of
 from . import Corrector
 
@@ -57,7 +58,7 @@ def correct(source: Any, model: SensorModel, sampling_rate_hz: float | None = No
     if is_bag(source):
         from ..io.bag import RAW_TOPIC, read_bag
         topic = sensor or RAW_TOPIC
-        samples = read_bag(source, [topic])[topic]
+        samples, _ = in_order(read_bag(source, [topic])[topic])
     else:
         samples = samples_of(source, sampling_rate_hz, axis, "sensor")
     corrector = Corrector(model, sampling_rate_hz or 0.0, **wishes)

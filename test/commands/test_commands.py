@@ -75,6 +75,27 @@ def test_correct_is_the_kernel(tmp_path):
     assert json.loads(result.read_text())["counters"] == corrector.counters
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_samples_that_a_recorder_has_mixed_are_corrected_in_the_order_of_their_stamps(
+        seed, tmp_path, capsys):
+    rng = np.random.default_rng(seed)
+    raw = read_bag(bag(CLASSICAL))[RAW_TOPIC]
+    logs = raw.stamps_ns + np.round(rng.uniform(0, 5e6, len(raw.stamps_ns))).astype(np.int64)
+    with BagWriter(tmp_path / "mixed.mcap") as writer:
+        writer.add_topic(RAW_TOPIC, cdr.IMU)
+        writer.write_many(RAW_TOPIC, sorted(zip(
+            cdr.encode_samples(cdr.IMU, raw), logs.tolist(), logs.tolist()),
+            key=lambda entry: entry[1]))
+    assert main(["correct", str(tmp_path / "mixed.mcap"), "--model", model(CLASSICAL), "-o",
+                 str(tmp_path / "c.mcap")]) == 0
+    corrected = read_bag(tmp_path / "c.mcap")[CORRECTED_TOPIC]
+    expected = Corrector(SensorModel.load(model(CLASSICAL))).process(
+        raw.stamps_ns, raw.values, raw.variance)
+    np.testing.assert_array_equal(corrected.values, expected.values)
+    np.testing.assert_array_equal(corrected.stamps_ns, expected.stamps_ns)
+    assert "came after a later one: all are put in the order" in capsys.readouterr().out
+
+
 def test_validate(tmp_path, capsys):
     result = tmp_path / "r.json"
     for axis in "xyz":

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from frac_accel import Record, Samples
-from frac_accel.record.clock import in_order
+from frac_accel.record.ordering import Reordering, in_order
 
 RATE = 2000.0
 
@@ -50,3 +50,25 @@ def test_one_wrong_stamp_does_not_move_its_sample():
     stamps = samples.stamps_ns.copy()
     stamps[2000] = stamps[1990]
     assert in_order(Samples.of(stamps, samples.values))[1] == 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_in_blocks_as_in_one_piece(seed):
+    rng = np.random.default_rng(seed)
+    whole = run(rng)
+    other = mixed(whole, rng, rng.uniform(0.2, 5) / RATE)
+    names, late = list(range(len(whole.stamps_ns))), in_order(other)[1]
+    order, parts, start = Reordering(), [], 0
+    while start < len(names):
+        stop = start + int(rng.integers(1, 300))
+        rows = slice(start, stop)
+        parts.append(order.add(other._replace(
+            stamps_ns=other.stamps_ns[rows], values=other.values[rows],
+            variance=other.variance[rows]), names[rows]))
+        start = stop
+    parts.append(order.rest())
+    assert order.late == late
+    np.testing.assert_array_equal(np.concatenate([s.stamps_ns for s, _ in parts]), whole.stamps_ns)
+    np.testing.assert_array_equal(np.concatenate([s.values for s, _ in parts]), whole.values)
+    place = np.concatenate([told for _, told in parts]).astype(int)
+    np.testing.assert_array_equal(other.stamps_ns[place], whole.stamps_ns)
