@@ -85,6 +85,8 @@ _EDGE = 0.95
 # Damping ratio below which a link has a peak, and times what is left within half an octave of it
 # (RMS) that it must then take.
 _PEAKED, _AT_PEAK = 0.1, 10.0
+# Times as dense as in the octaves beside its resonance that what is left must be there to be of it.
+_DENSER = 10.0
 # Damping ratio above which a mode beside the sensor's own hardly rings, and below which a peak is
 # no smooth filter's.
 _RINGS, _CLEAR_PEAK = 0.3, 0.2
@@ -133,10 +135,9 @@ def doubts_about(engine, best, gains, stds, left, noise):
             if rms < WEIGHS * strange and not engine.stands_alone(best, cause, rms):
                 doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) does not stand out of "
                                          f"what is left unexplained ({strange:.3g} RMS)")
-    if noise.rms is None and left.rms > _MOST_OF * np.std(p.measured[p.used]):
+    if words := most_is_left(engine, left, noise):
         for cause in gains:
-            doubts.setdefault(cause, f"{left.rms / np.std(p.measured[p.used]):.0%} of the output "
-                                     "is left, and nothing shows that it is noise")
+            doubts.setdefault(cause, words)
     for cause, words in {**by_what_is_left(engine, best, takes, left),
                          **_acausal(engine, best, stds), **_of_the_model(engine, best),
                          **_as_slow(engine, best, added, takes),
@@ -157,12 +158,21 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
                          **_at_the_edge(engine, best), **_hardly_rings(engine, best),
                          **_out_of_sight(engine, best),
+                         **_rings_otherwise(engine, best, takes, noise),
                          **_corrections(engine, best, takes)}.items():
         doubts.setdefault(cause, words)
     if gains and (left.share > 0 or not engine.is_accounted(best, noise)):
         for cause, words in engine.unstable(best).items():
             doubts.setdefault(cause, words)
     return {cause: words for cause, words in doubts.items() if cause in gains}
+
+
+def most_is_left(engine, left, noise):
+    """Why nothing has a name that a fit alone shows, where most of the output is left; or ""."""
+    share = left.rms / np.std(engine.problem.measured[engine.problem.used])
+    if noise.rms is not None or share < _MOST_OF:
+        return ""
+    return f"{share:.0%} of the output is left, and nothing shows that it is noise"
 
 
 def _beside_a_strong_force(engine, best, takes, left, noise):
@@ -306,15 +316,37 @@ def _at_standstill(engine, best, takes):
 def _stands_out_at_its_peak(engine, best, cause, taken):
     """Whether a lightly damped link takes far more than all that is left around its resonance:
     whatever filter is missing elsewhere, this peak is there."""
-    effect, p = best.effects[cause], engine.problem
+    there = _share_at_its_peak(engine, best, best.effects[cause])[0]
+    return there is not None and taken > _AT_PEAK * math.sqrt(there) * engine.rms(best.residual)
+
+
+def _share_at_its_peak(engine, best, effect):
+    """Share of what is left (power) within half an octave of a lightly damped link's resonance, and
+    how many times as dense it is as in the octaves on either side; None of another effect."""
     if not is_link(effect) or not 0 < _damping(effect) <= _PEAKED:
-        return False
+        return None, 0.0
+    p = engine.problem
     frequency = np.fft.rfftfreq(len(p.used), 1 / p.rate)
-    apart = np.abs(np.log2(np.maximum(frequency, 1e-300) * 2 * np.pi
-                           / np.abs(effect.poles()).min()))
-    spectrum = np.fft.rfft(best.residual * p.used)
-    there = np.fft.irfft(np.where(apart < 0.5, spectrum, 0.0), len(p.used))
-    return taken > _AT_PEAK * engine.rms(there)
+    apart = np.log2(np.maximum(frequency, 1e-300) * 2 * np.pi / np.abs(effect.poles()).min())
+    power = np.abs(np.fft.rfft(best.residual * p.used))**2
+    near = np.abs(apart) < 0.5
+    beside = [power[(side * apart > 0.5) & (side * apart < 1.5)] for side in (-1, 1)]
+    denser = power[near].mean() / max(part.mean() for part in beside) \
+        if near.any() and all(map(len, beside)) else 0.0
+    return power[near].sum() / max(power.sum(), 1e-300), denser
+
+
+def _rings_otherwise(engine, best, takes, noise):
+    """Lightly damped links at whose resonance most of what is left lies: no noise, but another way
+    of ringing, such as a frequency that falls with the amplitude."""
+    found, rest = {}, engine.rms(best.residual)
+    for cause, taken in takes.items() if noise.rms is None else ():
+        share, denser = _share_at_its_peak(engine, best, best.effects[cause])
+        if share is not None and share > _MOSTLY and denser > _DENSER \
+                and taken < _AT_PEAK * math.sqrt(share) * rest:
+            found[cause] = f"{share:.0%} of what is left lies at its resonance ({rest:.3g} RMS " \
+                           f"beside {taken:.3g} that it takes): what rings there is not linear"
+    return found
 
 
 def _hardly_more(engine, best, left):
@@ -469,8 +501,8 @@ def _highest_seen_hz(engine, best):
 
 def _beyond_the_motion(engine, best):
     """Links of the sensor that resonate above all of the motion, where other filters do the same:
-    those that make fast motion larger beside a late reference, which may have been smoothed, and
-    any beside a core that does so, too, and that nobody has stated."""
+    those that make fast motion larger beside a late reference, which may have been smoothed, any
+    beside a core that does so, too, and that nobody has stated, and several beside a stated one."""
     p, found = engine.problem, {}
     highest = 2 * np.pi * _highest_hz(engine, best)
     seen = 2 * np.pi * min(_highest_hz(engine, best, _ALL_MOTION), _highest_seen_hz(engine, best))
@@ -488,7 +520,23 @@ def _beyond_the_motion(engine, best):
         elif len(core) and min(lowest, np.min(core)) > _OUT_OF_SIGHT * seen:
             found[cause] = f"it and the core resonate above the motion, which shows up to " \
                            f"{seen / 2 / np.pi:.3g} Hz: there many filters do the same"
+    unseen = [cause for cause, effect in best.effects.items() if cause not in engine.search.base
+              and np.min(_poles(engine, best, effect), initial=np.inf) < np.inf
+              and np.min(_poles(engine, best, effect)) > _OUT_OF_SIGHT * seen]
+    if len(unseen) > 1:
+        found |= {cause: f"{' and '.join(sorted(unseen))} act above the motion, which shows up to "
+                         f"{seen / 2 / np.pi:.3g} Hz: there many filters do the same"
+                  for cause in unseen if cause not in found}
     return found
+
+
+def _poles(engine, best, effect):
+    """Sizes of the poles [rad/s] that an effect brings or, of an odd one of the core, changes."""
+    if is_link(effect):
+        return [] if effect.everyday or effect.of_reference else np.abs(effect.poles())
+    if effect.everyday or not effect.restates_core:
+        return []
+    return np.abs(engine.problem.axis_model(best.effects).effective_core.poles())
 
 
 def _end_of_band_hz(problem):

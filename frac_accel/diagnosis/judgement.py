@@ -20,6 +20,7 @@ from .doubts import (
     doubts_about,
     least_lead,
     left_open,
+    most_is_left,
     own_delay_s,
     resembles,
     within_own_delay,
@@ -317,7 +318,7 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
     if not complete:
         fraction = _remaining(engine, fitted, left.noise_rms)
     # beside the model as it is in the end, not beside one with what is only suspected
-    away, near = _moved(engine, fitted, stds)
+    away, near = _moved(engine, fitted, stds, most_is_left(engine, left, noise))
     drifts, other_course = courses.findings(engine, fitted, stds)
     suspects += [_suspect({cause}, 0.0, words) for cause, words in (near | other_course).items()]
     unnamed += sorted(other_course)
@@ -714,9 +715,9 @@ def _confidence(margin):
     return float(expit(margin / 2))
 
 
-def _moved(engine, best, stds):
+def _moved(engine, best, stds, doubt):
     """Findings among the causes that were free: farther from the model than it allows for; and
-    those in doubt, with words."""
+    those in doubt, with words: all of them where there is a `doubt` already."""
     findings, doubtful = [], {}
     for cause, entry in engine.loose.items():
         effect = best.effects.get(cause)
@@ -736,16 +737,16 @@ def _moved(engine, best, stds):
         g = gain(error + (best.simulated - held)[rows], error)
         if not g.is_relevant or g.taken < WEIGHS * engine.unexplained(best):
             continue
-        words = resembles(engine, best, effect, g.taken) \
+        words = doubt or resembles(engine, best, effect, g.taken) \
             or within_own_delay(engine, best, effect) or least_lead(engine, best, effect)
         other = None if words or not entry.is_known else \
             engine.instead_of_moved(best, entry.effect)
         if other:
             words = f"{other} explains more"
+        mirror = fault_of_reference(effect)  # what no sensor can do
         if words:
-            doubtful[cause] = words
+            doubtful[(mirror or effect).cause] = words
         else:
-            mirror = fault_of_reference(effect)  # what no sensor can do
             findings.append(Finding(mirror or effect, stds[cause], _confidence(farthest**2), [
                 cause] if mirror else [], [
                 f"{farthest:.3g} standard uncertainties from the model's own value",

@@ -10,6 +10,7 @@ from scipy.optimize import lsq_linear
 from ..errors import FracAccelError
 from ..identification.response.excitation import strongest_stretch
 from ..model import AXES, AxisModel, is_link
+from ..model.core.static_force import StaticForce
 from ..model.effects.base import CORE, CROSS_AXIS, DEAD_ZONE, GAIN, Effect
 from ..model.parameters import Scales, fixed_values, parameter_fields
 from ..signals.kept import kept
@@ -279,11 +280,16 @@ class Problem:
 
         Forces of the spring act on the motion as it is, other causes as if there were no such
         forces, and what comes across from the other axes stays as it is: cheap, and right for small
-        ones.
+        ones. A force that holds the mass is none where that hardly moves otherwise: it is simulated
+        where there is no other force.
         """
         linear = {name: other for name, other in effects.items()
                   if not acts_on_spring(other) and name != cause}
         model = self.axis_model(linear)
+        alone = cause not in effects and len(linear) == len(effects)
+        if alone and _holds(effect, model):
+            return self.simulate({**effects, cause: effect}, steps=_STEPS_OF_SLOPES) \
+                - self._remembered(linear, True)
         if acts_on_spring(effect) and type(effect).base_gain is Effect.base_gain:
             motion = self.motion({name: other for name, other in effects.items() if name != cause})
             added = self.force(model, effect, motion)
@@ -695,6 +701,12 @@ class Problem:
     def excited(self):
         """By axis, whether the reference moves along it."""
         return {name: bool(np.ptp(self.record.reference[:, i])) for i, name in enumerate(AXES)}
+
+
+def _holds(effect, model):
+    """Whether an effect's force holds the mass of a model's core at rest."""
+    return acts_on_spring(effect) and effect.add_force(
+        StaticForce(core=model.effective_core)).friction_level != 0
 
 
 def acts_on_spring(effect):

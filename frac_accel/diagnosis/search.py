@@ -461,7 +461,9 @@ class Search:
             seeds.append(self.everyday(bare))
         grown = self.grow([begin for i, begin in enumerate(seeds) if begin or not i],
                           threshold, promises, done, _MOST)
-        return self._with_one_filter(self.prune(grown, threshold))
+        best = self.prune(grown, threshold)
+        other = self._with_one_filter(best)
+        return best if other is best else self.prune(other, threshold)
 
     def _with_one_filter(self, best):
         """A set with one filter in place of several, where that describes the record as well.
@@ -471,7 +473,7 @@ class Search:
         """
         filters = {cause for cause, effect in best.effects.items()
                    if cause not in self.base and acts_as_filter(effect)}
-        if len(filters) < 2 or is_nonlinear(best) or self.problem.limit.ends_search(
+        if len(filters) < 2 or self.problem.limit.ends_search(
                 "one filter in place of several was not tried"):
             return best
         rest = self.fit({c: effect for c, effect in best.effects.items() if c not in filters})

@@ -1,7 +1,9 @@
 """Two places of one structure: the second is no sensor of the first, and nothing has a name."""
 
 import numpy as np
+import pytest
 import scipy.signal as sig
+from rig.oscillator import integrate
 
 import frac_accel
 from frac_accel.diagnosis.leftover import leftover
@@ -85,3 +87,23 @@ def test_it_says_that_an_event_was_too_short_for_a_filter():
                                 frac_accel.SensorModel(Gain(1.0)), sampling_rate_hz=RATE,
                                 time_limit_s=1e-3)
     assert any("could be judged on other data" in words for words in found.integrity.words)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("softening", [0.0, 2e-3])
+def test_a_part_that_rings_is_a_second_resonance_while_it_is_linear(seed, softening):
+    rng, fine, n = np.random.default_rng([23, seed]), 16, 12_000
+    base = sig.sosfilt(sig.butter(2, [1.0, 20.0], "band", fs=RATE * fine, output="sos"),
+                       rng.normal(size=n * fine))
+    base *= np.clip(np.arange(n * fine) / (RATE * fine), 0, 1) / base.std()
+    frequency_hz, share = rng.uniform(7, 10), rng.uniform(0.03, 0.05)
+    part = integrate(np.append(base, base[-1]), 1 / (RATE * fine), frequency_hz, 0.03,
+                     alpha3=-softening).q[:n * fine]
+    pair = tuple(values[::fine] + 0.0015 * values.std() * rng.standard_normal(n)
+                 for values in (base, (1 - share) * base + share * part))
+    found = frac_accel.diagnose(pair, frac_accel.SensorModel(Gain(1.0)), sampling_rate_hz=RATE)
+    if softening:
+        assert not found.findings and found.verdict == "unexplained"
+        assert "lies at its resonance" in found.suspects[0]["reason"]
+    else:
+        assert [finding.cause for finding in found.findings] == ["second_resonance"]

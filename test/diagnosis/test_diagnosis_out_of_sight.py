@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 import rig
+from rig.excitation import band_noise
 from rig.oscillator import integrate
+from rig.record import simulate_record
+from rig.sensor import Sensor
 from scipy.signal import butter, cont2discrete, lfilter, sosfilt
 from shaken import OVERSAMPLING, measured, shocks
 
@@ -106,3 +109,22 @@ def test_what_an_identified_sensor_shows_too_early_is_the_references_doing(seed,
     assert finding.cause == "reference_delay"
     assert abs(finding.effect.delay_s - late) < 4 * finding.std["delay_s"] < 2e-3
     assert found.model.reference_faults == (finding.effect,)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", [9, 10])
+def test_two_filters_above_the_motion_have_no_name(seed):
+    # a viscoelastic mount was told as these two: below them many filters do the same
+    rng = np.random.default_rng(seed)
+    core = {"type": "oscillator", "natural_frequency_hz": rng.uniform(480, 560),
+            "damping_ratio": 0.13, "damping_order": 1.0, "sensitivity": 1.0}
+    record = simulate_record(Sensor(core, {
+        "mounting_resonance": {"frequency_hz": rng.uniform(270, 310), "damping_ratio": 0.054},
+        "fractional_damping": {"damping_order": 1.2, "damping_ratio": 0.48}}),
+        band_noise(rng, 500.0, 40.0, (1.0, 160.0)), rng, snr_db=rng.uniform(33, 36))
+    found = frac_accel.diagnose(
+        (Samples.of(record.stamps_ns, record.reference),
+         Samples.of(record.sensor_stamps_ns, record.sensor)),
+        SensorModel.from_dict({"schema": "frac_accel/sensor_model/1", "core": core}))
+    assert not found.findings
+    assert any("many filters do the same" in suspect["reason"] for suspect in found.suspects)

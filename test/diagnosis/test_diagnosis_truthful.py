@@ -64,6 +64,22 @@ def test_the_whole_record_counts_for_the_verdict(seed):
     assert not named(found)
 
 
+@pytest.mark.parametrize("after_each, has_name", [(False, True), (True, False)])
+def test_bursts_beside_a_motion_that_comes_and_goes(after_each, has_name):
+    # as of vehicles that pass a bridge; what follows each of them is no noise from elsewhere
+    rng = np.random.default_rng(3136)
+    time = np.arange(24_000) / RATE
+    passes = (np.arange(6) + rng.uniform(0.2, 0.4, 6)) / 6 * time[-1]
+    rattles = passes + 4.0 if after_each else passes + rng.uniform(15, 25, 6)
+    motion = sum(np.exp(-np.square((time - at) / 1.2)) for at in passes) + 0.05
+    motion = motion * lfilter([1, -1], [1, -0.7], rng.standard_normal(len(time)))
+    loud = np.min(np.abs(time[:, None] - rattles), axis=1) < 1.5
+    noise = (NOISE + 0.4 * loud) * np.std(motion) * rng.standard_normal(len(time))
+    found = frac_accel.diagnose((motion, motion + noise), frac_accel.SensorModel(Gain(1.0)),
+                                sampling_rate_hz=RATE)
+    assert named(found) == ({"interference_bursts"} if has_name else set())
+
+
 @pytest.mark.parametrize("seed", [3131, 3132])
 def test_a_sensor_that_sticks_has_no_bursts(seed):
     rng, motion, _ = drive(seed)

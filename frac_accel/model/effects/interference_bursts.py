@@ -92,7 +92,8 @@ class InterferenceBursts(Effect):
         return cls(float(share), rms), Reading(stds, error, after, (
             f"{len(starts)} bursts of {length:.3g} samples on average, "
             f"{np.sqrt(loud / noise):.3g} times as loud as the rest, whatever the motion does"),
-            drowned)
+            drowned, evident=seen.parts().keys() == {"bursts"}
+            and _apart_from_motion(inside, output, length))
 
 
 def _near(missing):
@@ -168,6 +169,13 @@ def _follows(inside, error, output, count):
         if abs(np.corrcoef(values[inside], error[inside])[0, 1]) > _allowed(samples):
             return True
     return False
+
+
+def _apart_from_motion(inside, output, length):
+    """Whether bursts, and as long before and after them, hold less of the motion than any time."""
+    near = np.convolve(inside, np.ones(2 * int(length) + 1), "same") > 0.5
+    power = (output - output.mean())**2
+    return power[near].mean() < power.mean()
 
 
 def _one_sided(error, inside):

@@ -1,0 +1,31 @@
+"""Dry friction of a mass that moves so slowly that it sticks at each turn: it is no play."""
+
+import numpy as np
+import pytest
+from rig.excitation import band_noise
+from rig.record import simulate_record
+from rig.sensor import Sensor
+
+from frac_accel import Samples, SensorModel, diagnose
+
+CORE = {"type": "oscillator", "damping_order": 1.0, "sensitivity": 1.0}
+
+
+@pytest.mark.parametrize("seed", [
+    3, pytest.param(1, marks=pytest.mark.thorough), pytest.param(2, marks=pytest.mark.thorough)])
+def test_friction_beside_a_lag_in_slow_waves_is_named(seed):
+    rng = np.random.default_rng([17, seed])
+    core = {**CORE, "natural_frequency_hz": rng.uniform(1.0, 1.6),
+            "damping_ratio": rng.uniform(0.4, 0.7)}
+    level, corner_hz = rng.uniform(0.01, 0.03), rng.uniform(0.6, 1.2)
+    record = simulate_record(
+        Sensor(core, {"coulomb_friction": {"level": level}, "low_pass_lag": {
+            "corner_hz": corner_hz}}),
+        band_noise(rng, 50.0, 160.0, (0.07, 0.33)), rng, snr_db=66.0)
+    found = diagnose((Samples.of(record.stamps_ns, record.reference),
+                      Samples.of(record.sensor_stamps_ns, record.sensor)),
+                     SensorModel.from_dict({"schema": "frac_accel/sensor_model/1", "core": core}))
+    assert sorted(f.cause for f in found.findings) == ["coulomb_friction", "low_pass_lag"]
+    sizes = {f.cause: f.effect for f in found.findings}
+    assert sizes["coulomb_friction"].level == pytest.approx(level, rel=0.02)
+    assert sizes["low_pass_lag"].corner_hz == pytest.approx(corner_hz, rel=0.01)
