@@ -43,4 +43,4 @@ def test_a_zero_that_has_settled_is_named(seed):
 
 def test_what_was_open_and_gave_way_to_another_cause_has_not_moved():
     engine = SimpleNamespace(loose={"sensitivity_error": None})
-    assert _moved(engine, SimpleNamespace(effects={}), {}) == ([], {})
+    assert _moved(engine, SimpleNamespace(effects={}), {}, "") == ([], {})
