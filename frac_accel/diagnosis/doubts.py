@@ -521,8 +521,7 @@ def _beyond_the_motion(engine, best):
             found[cause] = f"it and the core resonate above the motion, which shows up to " \
                            f"{seen / 2 / np.pi:.3g} Hz: there many filters do the same"
     unseen = [cause for cause, effect in best.effects.items() if cause not in engine.search.base
-              and np.min(_poles(engine, best, effect), initial=np.inf) < np.inf
-              and np.min(_poles(engine, best, effect)) > _OUT_OF_SIGHT * seen]
+              and _lowest_pole(engine, best, effect) > _OUT_OF_SIGHT * seen]
     if len(unseen) > 1:
         found |= {cause: f"{' and '.join(sorted(unseen))} act above the motion, which shows up to "
                          f"{seen / 2 / np.pi:.3g} Hz: there many filters do the same"
@@ -530,13 +529,13 @@ def _beyond_the_motion(engine, best):
     return found
 
 
-def _poles(engine, best, effect):
-    """Sizes of the poles [rad/s] that an effect brings or, of an odd one of the core, changes."""
-    if is_link(effect):
-        return [] if effect.everyday or effect.of_reference else np.abs(effect.poles())
-    if effect.everyday or not effect.restates_core:
-        return []
-    return np.abs(engine.problem.axis_model(best.effects).effective_core.poles())
+def _lowest_pole(engine, best, effect):
+    """Size [rad/s] of the lowest pole that an odd effect of the sensor brings, or changes in its
+    core; 0 of any other effect."""
+    if effect.everyday or effect.of_reference or not (is_link(effect) or effect.restates_core):
+        return 0.0
+    own = effect if is_link(effect) else engine.problem.axis_model(best.effects).effective_core
+    return np.abs(own.poles()).min() if len(own.poles()) else 0.0
 
 
 def _end_of_band_hz(problem):

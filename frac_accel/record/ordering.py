@@ -36,7 +36,7 @@ class Reordering:
         """The next samples, with lists of what belongs to each; what is certain by now."""
         if self._samples is not None:
             samples = type(samples).concatenate([self._samples, samples])
-            others = [held + list(new) for held, new in zip(self._others, others)]
+            others = [held + new for held, new in zip(self._others, others)]
         order, late = order_of(samples.stamps_ns)
         if late:
             samples = _taken(samples, order)
@@ -44,8 +44,8 @@ class Reordering:
             self.late += late
         count = max(len(samples.stamps_ns) - _MIXED, 0)
         self._samples = _taken(samples, slice(count, None))
-        self._others = [list(each[count:]) for each in others]
-        return (_taken(samples, slice(count)), *(list(each[:count]) for each in others))
+        self._others = [each[count:] for each in others]
+        return (_taken(samples, slice(count)), *(each[:count] for each in others))
 
     def rest(self):
         """What is still held back; None where nothing has come."""
@@ -53,8 +53,8 @@ class Reordering:
 
 
 def order_of(stamps):
-    """Order in which stamps rise, and how many come after a later one: 0 where that is no order of
-    the samples.
+    """Order in which stamps rise, and how many come after a later one; None and 0 where that is no
+    order of the samples, or they are in it.
 
     It is one where a recorder has mixed them only: none is far from its place, and once they are
     in order they are no closer together than others. Behind a clock that was set back they are.
@@ -62,12 +62,12 @@ def order_of(stamps):
     steps = np.diff(stamps)
     back = int(np.count_nonzero(steps < 0))
     if not back:
-        return slice(None), 0
+        return None, 0
     order = np.argsort(stamps, kind="stable")
     steps = np.diff(stamps[order])
     if np.max(np.abs(order - np.arange(len(order)))) > _MIXED \
             or np.count_nonzero(steps < _TOO_CLOSE * np.median(steps)) > back / 2:
-        return slice(None), 0
+        return None, 0
     return order, int(np.count_nonzero(stamps < np.maximum.accumulate(stamps)))
 
 
