@@ -233,10 +233,11 @@ class Search:
                         continue
                     tried.add(kind)
                     try:
-                        others.append(self.problem.fit({**fit.effects, cause: other}))
+                        others.append(self._at_pace({**fit.effects, cause: other},
+                                                    self._tied(fit.cost)))
                     except FracAccelError:
                         continue
-            close = min(other.cost for other in [fit, *others]) * (1 + _TIE / self.problem.count)
+            close = self._tied(min(other.cost for other in [fit, *others]))
             near = [other for other in [fit, *others] if other.cost <= close]
             if anew:
                 # what only says the same does not take its place
@@ -258,7 +259,7 @@ class Search:
                         "which of two resonances is the sensor's was not tried"):
                     continue
                 try:
-                    other = self.problem.fit({**fit.effects, **{e.cause: e for e in pair}})
+                    other = self._at_pace({**fit.effects, **{e.cause: e for e in pair}}, fit.cost)
                 except FracAccelError:
                     continue
                 fit = other if other.cost < fit.cost else fit
@@ -268,6 +269,16 @@ class Search:
         """How far what the model in use leaves open has moved from what it says."""
         return sum(abs(getattr(fit.effects[u.cause], u.name) - getattr(self.base[u.cause], u.name))
                    / u.scale for u in fit.unknowns if u.cause in self.base)
+
+    def _at_pace(self, effects, goal):
+        """A fit of some effects; where a motion is costly, not to the end if no pace to a goal (a
+        cost)."""
+        costly = any(map(acts_on_spring, effects.values()))
+        return self.problem.fit(effects, goal=goal if costly else np.inf)
+
+    def _tied(self, cost):
+        """Cost up to which a fit ties with one."""
+        return (1 + _TIE / self.problem.count) * cost
 
     def _near(self, cost):
         return (1 + _NEAR / self.problem.count) * cost
@@ -479,7 +490,7 @@ class Search:
         rest = self.fit({c: effect for c, effect in best.effects.items() if c not in filters})
         alone = map(self.varied, self.with_a_filter(rest, _FITS)[:_BEAM])
         return min((fit for fit in alone
-                    if fit.cost <= (1 + _TIE / self.problem.count) * best.cost),
+                    if fit.cost <= self._tied(best.cost)),
                    key=lambda fit: fit.cost, default=best)
 
     def with_a_filter(self, fitted, most, best=np.inf):

@@ -35,6 +35,9 @@ _FEW_STEPS = 4
 _LONG = 1 << 20
 # Frequencies at which links are evaluated at a time.
 _BLOCK = 65536
+# Where a constant response is seen, and what it must not drown beside [rad/s]: next to nothing,
+# since orders below zero and high-passes make s = 0 itself undefined, and all that may be asked.
+_CONSTANT_AND_MOVING = np.append(1e-9, 2j * np.pi * np.geomspace(1e-3, 1e5, 200))
 # Samples that a response between samples needs after the last one.
 _BEYOND = 8
 
@@ -328,7 +331,8 @@ class AxisSimulator:
             conditioner = _kept_of_short(self._conditioners, path, make, moving, self._rate * steps)
             moving = conditioner.response(_product(filtering, conditioner.s), consumed=True)
         gain = _product([effect for effect in behind if effect.stage >= GAIN], np.array([1j]))
-        start *= _static_gain(lambda s: _product(filtering, s)) if start else 0.0
+        if start and filtering:
+            start *= _static_gain(lambda s: _product(filtering, s))
         moving = self._shown(moving, steps, steps * position) if delay_s else \
             self._shown(moving[:steps * self._n], steps, None)
         return gain[0].real * (moving + start)
@@ -402,9 +406,8 @@ def static_gain(model):
 
 
 def _static_gain(transfer):
-    # the limit, since orders below zero and high-passes make s = 0 itself undefined
-    gain = transfer(np.array([1e-9 + 0j]))[0]
-    size = np.abs(transfer(2j * np.pi * np.geomspace(1e-3, 1e5, 200)))
+    gain, *others = transfer(_CONSTANT_AND_MOVING)
+    size = np.abs(others)
     largest = np.max(size[np.isfinite(size)], initial=0.0)
     # without bound where a high-pass is undone: what went before is then not in the record
     bounded = np.isfinite(gain) and abs(gain) < 1e6 * largest

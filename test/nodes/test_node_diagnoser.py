@@ -60,8 +60,10 @@ def test_a_change_is_told_and_its_model_applied_and_taken_back(tmp_path):
         node.wait_for('"step": "applied"', 60)
         corrector.wait_for("is in use", 30)
         extended = model_file_of(probe)
-        [effect] = SensorModel.load(extended).axis("x").effects
-        assert effect.gain == pytest.approx(1.1, abs=0.01)
+        # a busy machine loses messages on the way: that is in the record, too, and is named
+        [effect] = (effect for effect in SensorModel.load(extended).axis("x").effects
+                    if effect.cause != "dropped_samples")
+        assert effect.cause == "sensitivity_error" and effect.gain == pytest.approx(1.1, abs=0.01)
         statuses = [status for status in probe.statuses if status.name == "diagnoser: model"]
         values = {pair.key: pair.value for pair in statuses[-1].values}
         assert values["model_file"] == extended and values["state"] == "learning"
