@@ -2,9 +2,14 @@
 
 ``drives``: ten causes that begin on the way, at once and slowly: noticed, dated, named.
 ``healthy``: hours of driving in which nothing happens.
+``beside``: latency of a corrector while the diagnoser only watches, and while it diagnoses.
 """
 
 import argparse
+import json
+import tempfile
+import time
+from pathlib import Path
 
 import numpy as np
 from monitoring_rig import MODEL, ChangingDrive, chunks
@@ -85,15 +90,69 @@ def healthy(hours):
           f"{watch.detector.threshold:.3g}")
 
 
+def beside(turns, seconds=60.0, most_s=420.0):
+    """A healthy drive as it comes; in each turn first without a diagnosis, then with one."""
+    from ros_probe import Probe
+    from ros_processes import NodeProcess, ros_domain
+
+    from frac_accel.io.bag import RAW_TOPIC, REFERENCE_TOPIC, write_bag
+
+    figures = {f"/corrector/metrics/latency_{name}_s": [] for name in ("p50", "p99")}
+    with tempfile.TemporaryDirectory() as folder, ros_domain() as environment, \
+            Probe(environment) as probe:
+        model, bag = Path(folder) / "model.yaml", Path(folder) / "drive.mcap"
+        model.write_text(json.dumps(MODEL))
+        drive = ChangingDrive(3000, {}, duration_s=turns * (seconds + most_s), noise_std=5e-3)
+        write_bag(bag, dict(zip((REFERENCE_TOPIC, RAW_TOPIC), drive.samples())))
+        probe.watch(*figures)
+        with NodeProcess("corrector", environment, {"model_file": model}), \
+                NodeProcess("diagnoser", environment, {
+                    "model_file": model, "results": Path(folder) / "results"}) as node, \
+                NodeProcess("player", environment, {
+                    "bag": bag, "wait_for_subscribers": 2, "start_delay_s": 1.0}):
+            node.wait_for("watches axis x", 60)
+            time.sleep(90)
+            # what the filter waits for later samples is no load's doing
+            delay_s = next(float(pair.value) for status in probe.statuses for pair in status.values
+                           if pair.key == "filter_delay_s")
+            for turn in range(turns):
+                line = f"turn {turn}:"
+                for diagnoses in (False, True):
+                    if diagnoses:
+                        assert probe.trigger("/diagnoser/diagnose").success
+                    before = {topic: len(probe.figures[topic]) for topic in figures}
+                    time.sleep(seconds)
+                    ended = node.text.count('"step": "diagnosed"') > turn
+                    for topic, values in figures.items():
+                        values.append(np.median(probe.figures[topic][before[topic]:]) - delay_s)
+                        line += f" {1e3 * values[-1]:.2f} ms"
+                    line += " (ended before its time)" if ended and diagnoses else ";"
+                print(line, flush=True)
+                probe.until(lambda so_far=turn: node.text.count('"step": "diagnosed"') > so_far,
+                            "the diagnosis does not end", most_s)
+    for topic, values in figures.items():
+        alone, with_one = np.array(values).reshape(turns, 2).T
+        ratios = with_one / alone
+        print(f"{topic} beyond the filter's delay: {1e3 * np.median(alone):.2f} ms alone, "
+              f"{1e3 * np.median(with_one):.2f} ms beside a diagnosis; ratio "
+              f"{np.median(ratios):.3f} ({ratios.min():.3f} to {ratios.max():.3f}) in {turns} turns")
+
+
 def main():
     """Entry point."""
     parser = argparse.ArgumentParser(prog="monitoring_bench", description=__doc__)
-    parser.add_argument("part", choices=["drives", "healthy"])
+    parser.add_argument("part", choices=["drives", "healthy", "beside"])
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--hours", type=float, default=100.0)
+    parser.add_argument("--turns", type=int, default=5)
     chosen = parser.parse_args()
-    drives(chosen.count, chosen.first) if chosen.part == "drives" else healthy(chosen.hours)
+    if chosen.part == "drives":
+        drives(chosen.count, chosen.first)
+    elif chosen.part == "healthy":
+        healthy(chosen.hours)
+    else:
+        beside(chosen.turns)
 
 
 if __name__ == "__main__":

@@ -42,6 +42,9 @@ class Blocks:
         Products of the directions with the residual.
     power : ndarray, shape (k,)
         Sum of the residual's squares.
+    centre : ndarray, shape (k, 3)
+        What was taken from the output and from the other axes, before anything else was made of
+        them.
     excitation : float
         Standard deviation of the reference's motion along the axis [m/s²].
     """
@@ -51,6 +54,7 @@ class Blocks:
     gram: np.ndarray
     shared: np.ndarray
     power: np.ndarray
+    centre: np.ndarray
     excitation: float
 
     @classmethod
@@ -69,11 +73,28 @@ class Blocks:
         """Sums over so many blocks at a time; what is left over at the end is dropped."""
         count = len(self.power) // every
 
-        def sums(values):
-            return values[:count * every].reshape(count, every, *values.shape[1:]).sum(axis=1)
+        def together(values):
+            return values[:count * every].reshape(count, every, *values.shape[1:])
         return Blocks(self.start_ns[:count * every:every],
-                      *(sums(getattr(self, name)) for name in ("count", "gram", "shared", "power")),
-                      self.excitation)
+                      *(together(getattr(self, name)).sum(axis=1)
+                        for name in ("count", "gram", "shared", "power")),
+                      together(self.centre).mean(axis=1), self.excitation)
+
+    def about_one_centre(self):
+        """The same sums, of directions that all have the centre of the last block.
+
+        About the mean of its own window, a gain shows along the level, too, by another amount in
+        each; a square along the output.
+        """
+        away = self.centre - self.centre[-1]
+        turn = np.tile(np.eye(self.shared.shape[1]), (len(away), 1, 1))
+        output = away[:, 0]
+        turn[:, 1, 0], turn[:, 6, 0], turn[:, 7, 0] = away.T
+        turn[:, 4, 0], turn[:, 4, 1] = output**2, 2 * output
+        turn[:, 5, 0], turn[:, 5, 1], turn[:, 5, 4] = output**3, 3 * output**2, 3 * output
+        return dataclasses.replace(
+            self, gram=turn @ self.gram @ turn.transpose(0, 2, 1), centre=self.centre - away,
+            shared=np.einsum("kij,kj->ki", turn, self.shared))
 
 
 def blocks_of(reference, sensor, model, axis, keep_from_ns, epoch_ns):
@@ -107,7 +128,9 @@ def blocks_of(reference, sensor, model, axis, keep_from_ns, epoch_ns):
     point = problem.point({}, False)
     if not np.isfinite(point.cost):
         raise FracAccelError("the model's motion has no bound")
-    directions = _directions(point.simulated, record.reference, column, problem.rate, problem.used)
+    others = np.delete(record.reference, column, axis=1)
+    centre = np.r_[point.simulated[problem.used].mean(), others.mean(axis=0)]
+    directions = _directions(point.simulated - centre[0], others - centre[1:], problem.rate)
     used = problem.used & (np.arange(len(record)) / problem.rate * 1e9 + record.start_ns
                            >= keep_from_ns)
     size = max(round(BLOCK_S * problem.rate), 1)
@@ -121,7 +144,7 @@ def blocks_of(reference, sensor, model, axis, keep_from_ns, epoch_ns):
         (record.start_ns + (first + size * np.arange(count)) * 1e9 / problem.rate).astype(np.int64),
         weight.sum(axis=1).astype(float), np.einsum("kni,knj->kij", x, x),
         np.einsum("kni,kn->ki", x, residual), np.sum((residual * weight)**2, axis=1)
-        + _FLOOR * np.var(point.simulated) * weight.sum(axis=1),
+        + _FLOOR * np.var(point.simulated) * weight.sum(axis=1), np.tile(centre, (count, 1)),
         float(np.std(record.reference[problem.used, column])))
     total = max(blocks.count.sum(), 1.0)
     return blocks, float(np.sqrt(blocks.power.sum() / total))
@@ -137,11 +160,9 @@ def _settled(record):
     return used
 
 
-def _directions(simulated, reference, column, rate, used):
+def _directions(swing, others, rate):
     """Columns by which the residual is looked at, shape (n, 8)."""
-    swing = simulated - simulated[used].mean()
     slope = np.gradient(swing) * rate
-    others = [reference[:, i] - reference[:, i].mean() for i in range(3) if i != column]
     columns = [np.ones(len(swing)), swing, slope, np.gradient(slope) * rate, swing**2, swing**3,
-               *others]
+               *others.T]
     return np.stack(columns, axis=1)

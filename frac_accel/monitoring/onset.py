@@ -1,5 +1,6 @@
 """When a change began, with an interval: of one that came at once, or grew."""
 
+import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +52,9 @@ def onset(blocks, learnt):
     -------
     Onset
     """
+    blocks = dataclasses.replace(blocks, power=np.maximum(learnt.left(blocks), 1e-300),
+                                 shared=blocks.shared - blocks.gram @ learnt.mean)
+    blocks = blocks.about_one_centre()
     found, is_early = _posterior(blocks.last(_MOST), learnt)
     if is_early and len(blocks.power) > _MOST:
         found, _ = _posterior(blocks.merged(-(-len(blocks.power) // _MOST)), learnt)
@@ -87,6 +91,7 @@ def _changed(blocks, learnt, course):
     Parameters
     ----------
     blocks : Blocks
+        Without the model's own error.
     learnt : Learnt
     course : ndarray, shape (m, k)
 
@@ -96,8 +101,7 @@ def _changed(blocks, learnt, course):
     scatter : ndarray, shape (m,)
         How much more the blocks' powers scatter after the change than those of white noise.
     """
-    shared = blocks.shared - blocks.gram @ learnt.mean
-    power, n = np.maximum(learnt.left(blocks), 1e-300), blocks.count
+    shared, power, n = blocks.shared, blocks.power, blocks.count
     gram, own = blocks.gram.reshape(len(power), -1), course**2
     shares = _shares((own @ gram).reshape(-1, *blocks.gram.shape[1:]), course @ shared)
     squares = (shares[:, :, None] * shares[:, None, :]).reshape(len(course), -1)

@@ -136,7 +136,8 @@ class Watch:
             return None
         inside = blocks.start_ns < stop_ns - round(BLOCK_S * 0.5e9)
         blocks = Blocks(*(getattr(blocks, name)[inside] for name in
-                          ("start_ns", "count", "gram", "shared", "power")), blocks.excitation)
+                          ("start_ns", "count", "gram", "shared", "power", "centre")),
+                        blocks.excitation)
         self.windows += 1
         window = Window(start_ns, stop_ns, *parts, blocks.excitation, rms)
         self._keep(window, blocks)

@@ -6,6 +6,7 @@ from monitoring_rig import MODEL, ChangingDrive, chunks
 
 from frac_accel import diagnose
 from frac_accel.model import SensorModel
+from frac_accel.monitoring.blocks import Blocks, _directions
 from frac_accel.monitoring.detector import Detector, _bet
 from frac_accel.monitoring.trial import Trial
 from frac_accel.monitoring.watch import ENOUGH_S, Watch
@@ -55,12 +56,38 @@ def test_a_sudden_change_is_dated_and_named(model, seed, effects):
     assert worse.verdict != "won"
 
 
-def test_a_growing_change_is_dated_with_an_interval_that_holds_it(model):
-    drive = ChangingDrive(5, {"sensitivity_error": {"gain": 1.1}}, 330.0, 200.0)
+@pytest.mark.parametrize("seed, at_s, ramp_s, gain", [
+    (5, 330.0, 200.0, 1.1),
+    # it brakes just after the onset: what is level in one window is none in the next
+    pytest.param(1110, 505.83, 60.0, 1.05, marks=pytest.mark.thorough)])
+def test_a_growing_change_is_dated_with_an_interval_that_holds_it(
+        model, seed, at_s, ramp_s, gain):
+    drive = ChangingDrive(seed, {"sensitivity_error": {"gain": gain}}, at_s, ramp_s, 720.0)
     watch, noticed = watched(drive, model)
     change = watch.changed
-    assert noticed > 330 and change.is_gradual
-    assert drive.since_start_s(change.low_ns) <= 330 <= drive.since_start_s(change.high_ns)
+    assert noticed > at_s and change.is_gradual
+    assert drive.since_start_s(change.low_ns) <= at_s <= drive.since_start_s(change.high_ns)
+
+
+def test_blocks_about_the_centres_of_their_windows_are_turned_to_one():
+    rng = np.random.default_rng(9)
+    output, others, residual = rng.normal(2.0, 1.0, 300), rng.normal(0.5, 1.0, (300, 2)), \
+        rng.normal(size=300)
+
+    def sums(centres):
+        """Of three blocks, each about a centre of its own."""
+        parts = []
+        for rows, centre in zip(np.split(np.arange(300), 3), centres):
+            x = _directions(output - centre[0], others - centre[1:], 100.0)[rows]
+            parts.append((0, len(rows), x.T @ x, x.T @ residual[rows],
+                          residual[rows] @ residual[rows], centre))
+        return Blocks(*map(np.array, zip(*parts)), 1.0)
+
+    centres = rng.normal(size=(3, 3))
+    turned, direct = sums(centres).about_one_centre(), sums(centres[[2, 2, 2]])
+    for name in ("gram", "shared", "centre"):
+        np.testing.assert_allclose(getattr(turned, name), getattr(direct, name), rtol=1e-9,
+                                   atol=1e-8)
 
 
 def test_a_healthy_drive_gives_no_alarm_and_costs_little(model):
