@@ -134,8 +134,8 @@ def beside(turns, seconds=60.0, most_s=420.0):
         alone, with_one = np.array(values).reshape(turns, 2).T
         ratios = with_one / alone
         print(f"{topic} beyond the filter's delay: {1e3 * np.median(alone):.2f} ms alone, "
-              f"{1e3 * np.median(with_one):.2f} ms beside a diagnosis; ratio "
-              f"{np.median(ratios):.3f} ({ratios.min():.3f} to {ratios.max():.3f}) in {turns} turns")
+              f"{1e3 * np.median(with_one):.2f} ms beside a diagnosis, {np.median(ratios):.3f} "
+              f"times as much ({ratios.min():.3f} to {ratios.max():.3f} in {turns} turns)")
 
 
 def main():

@@ -134,8 +134,9 @@ class Record:
         unknown = [~there for there in self.present] if self.present else [~self.valid] * 2
         unknown[1] = unknown[1] | (self.valid & ~used)
         signals = self.reference.copy(), self.sensor.copy()
-        guesses = [guessed(values[:, column], other[:, column], which) for values, other, which in
-                   zip(signals, signals[::-1], unknown)]
+        # copies, since the signals are filtered in place
+        guesses = [guessed(values[:, column].copy(), other[:, column], which)
+                   for values, other, which in zip(signals, signals[::-1], unknown)]
         for values, guess, which in zip(signals, guesses, unknown):
             values[:, column] = within(guess, self.sampling_rate_hz, self.band_hz, which)
         return dataclasses.replace(self, reference=signals[0], sensor=signals[1],
