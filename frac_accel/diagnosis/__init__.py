@@ -240,7 +240,9 @@ def _in_axes_of_reference(record, source, axis, temperature, model):
         return record, source, None, [
             f"the sensor's {axis} axis points the other way than the model says, or its polarity "
             "is reversed: a gain below zero says that"]
-    if not (orientation.astray(axis) or (opposes and orientation.upside_down)):
+    upside_down = opposes and orientation.upside_down and (model or _reversed_as_identified(
+        record, axis))
+    if not (orientation.astray(axis) or upside_down):
         return record, source, None, []
     try:
         source = source[0], orientation.turn(source[1])
@@ -252,18 +254,34 @@ def _in_axes_of_reference(record, source, axis, temperature, model):
         "into the reference's axes"]
 
 
+def _reversed_as_identified(record, axis):
+    """Whether a classical sensor of a record has a gain below zero: above a resonance all axes look
+    reversed, and are not."""
+    from ..identification import identify
+    try:
+        part, _ = strongest_part(record, AXES.index(axis), record.valid, MOST)
+        return _inverts(identify(part, axis, "classical").model.axis(axis))
+    except IdentificationError:
+        return True  # nothing speaks against the turn
+
+
 def _orientation(record, model):
-    """Orientation of a record's sensor; where it follows nothing as it is, and there is a model,
-    against what that makes of the reference: a resonance may have most of the power."""
+    """Orientation of a record's sensor; where it does not lie as its reference does, and there is a
+    model, against what that makes of the reference if that explains more: a resonance may have
+    most of the power, and above it all axes look reversed."""
     found = Orientation.of(record)
-    if model is None or found is None or any(found.followed(axis) for axis in AXES):
+    if model is None or found is None or (any(map(found.followed, AXES)) and not found.words):
         return found
     try:
+        # as the reference, a sensor that inverts has its own sign
         answer = [AxisSimulator(record.reference[:, i], record.sampling_rate_hz,
-                                record.temperature_c).simulate(model.axis(i)) for i in range(3)]
+                                record.temperature_c).simulate(own) * (-1 if _inverts(own) else 1)
+                  for i, own in enumerate(map(model.axis, AXES))]
     except FracAccelError:
         return found
-    return Orientation.of(dataclasses.replace(record, reference=np.stack(answer, axis=1)))
+    answered = Orientation.of(dataclasses.replace(record, reference=np.stack(answer, axis=1)))
+    return max((one for one in (answered, found) if one is not None),
+               key=lambda one: np.nansum(one.explained))
 
 
 def _inverts(own):

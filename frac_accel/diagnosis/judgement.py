@@ -66,6 +66,8 @@ _NEARLY = 0.05
 _COMMON = 0.1
 # Share of the error that all else leaves up to which what is only suspected describes a record.
 _CLEARLY = 0.9
+# Times as much of the held-out data (RMS) as the model in use leaves, that names must not leave.
+_MISLED = 1.1
 # Share of what is left (power) that may be no noise in a record that counts as consistent, where so
 # little is left that it need not be noise; more of it where that is such a share of the output
 # (RMS) at most.
@@ -456,7 +458,24 @@ def _sure(engine, best, findings, tied, left, fraction):
                     if f.cause in fitted.effects else f for f in findings]
     words = {**dict.fromkeys(sorted(doubtful), "too much is left that it does not explain"),
              **dropped}
+    if _misleads(engine, fitted):
+        words |= dict.fromkeys(sorted({f.cause for f in findings} & fitted.causes),
+                               "without what is only suspected, the model with it leaves more of "
+                               "the held-out data than the model in use")
+        findings = [f for f in findings if f.cause not in fitted.causes]
+        fitted, stds, _ = _refitted(engine, best, set(), tied)
+        fitted, stds = _with_identified(engine, best, fitted, stds)
     return findings, fitted, stds, [_suspect({cause}, 0.0, why) for cause, why in words.items()]
+
+
+def _misleads(engine, fitted):
+    """Whether a set leaves more of what it has not seen than the model in use, beside what the
+    reference's own noise, which a better model lets through, puts there."""
+    if fitted.causes == engine.search.baseline.causes:
+        return False
+    after, before = (_rms(engine.problem.measured - one.output, engine.held_out_rows)
+                     for one in (engine.learnt(fitted), engine.search.baseline))
+    return after**2 - engine.by_reference(fitted)**2 > (_MISLED * before)**2
 
 
 class Account(NamedTuple):

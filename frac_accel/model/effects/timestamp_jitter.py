@@ -25,9 +25,11 @@ class TimestampJitter(Effect):
 
     def reading(self, seen):
         """Beside a simulation whose samples are taken at the stamps that they carry; None of
-        batches, whose scatter is no jitter."""
+        batches, whose scatter is no jitter, and of stamps that the reference has, too: one logger
+        has stamped both, and sample belongs to sample."""
         words = next((words for words in seen.found.words if "scatter" in words), None)
-        if words is None:
+        both = [topic.stamps_ns for topic in seen.record.topics or ()]
+        if words is None or (both and np.array_equal(*both)):
             return None
         values, at_instants, at_stamps = seen.at_stamps()
         return Reading({"rms_s": self.rms_s / np.sqrt(2 * seen.found.samples)},
