@@ -87,14 +87,16 @@ bench: setup
 	$(python) benchmarks
 
 # Hours: 10 000 bags with workers killed at random, weak effects in 100 fleets, changes in 200
-# drives, 100 healthy hours. BENCH_FLEET="fleet_bench pooling --draws 5" for a part of it.
+# drives, 100 healthy hours, a corrector beside a diagnosis.
+# BENCH_FLEET="fleet_bench pooling --draws 5" for a part of it.
 bench-fleet: export OPENBLAS_NUM_THREADS := 1
 bench-fleet: setup
 ifdef BENCH_FLEET
 	PYTHONPATH=test:. $(python) -m $(BENCH_FLEET)
 else
 	for part in "fleet_bench workers" "fleet_bench restart" "fleet_bench pooling" \
-	    "monitoring_bench drives" "monitoring_bench healthy"; do PYTHONPATH=test:. $(python) -m $$part || exit; done
+	    "monitoring_bench drives" "monitoring_bench healthy" "monitoring_bench beside"; do \
+	    PYTHONPATH=test:. $(python) -m $$part || exit; done
 endif
 
 # MINUTES=2 for a shorter one; SOAK="--rate 2000 --restart 10" with publishers that come and go.
