@@ -240,9 +240,8 @@ def _in_axes_of_reference(record, source, axis, temperature, model):
         return record, source, None, [
             f"the sensor's {axis} axis points the other way than the model says, or its polarity "
             "is reversed: a gain below zero says that"]
-    upside_down = opposes and orientation.upside_down and (model or _reversed_as_identified(
-        record, axis))
-    if not (orientation.astray(axis) or upside_down):
+    if not (orientation.astray(axis) or (opposes and orientation.upside_down and (
+            model or _reversed_as_identified(record, axis)))):
         return record, source, None, []
     try:
         source = source[0], orientation.turn(source[1])

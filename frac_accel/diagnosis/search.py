@@ -175,13 +175,11 @@ class Search:
             if self.problem.limit.ends_search("some sets of causes were not tried"):
                 break
             try:
-                # a linear motion is cheap enough to be tried in any case
-                costly = any(map(acts_on_spring, effects.values()))
                 known = self.fits.get(key)
                 if known is None or _kinds(known.effects) != _kinds(effects):
                     # with an order that other sets found, a known set may do better
                     trial = self.problem.fit(effects, _TRIAL, True, _HOPELESS * best,
-                                             min(goal, self._near(best)) if costly else np.inf)
+                                             _goal(effects, min(goal, self._near(best))))
                     known = trial if known is None or trial.cost < known.cost else known
                 trials[key] = known
             except FracAccelError:
@@ -233,8 +231,9 @@ class Search:
                         continue
                     tried.add(kind)
                     try:
-                        others.append(self._at_pace({**fit.effects, cause: other},
-                                                    self._tied(fit.cost)))
+                        effects = {**fit.effects, cause: other}
+                        others.append(self.problem.fit(
+                            effects, goal=_goal(effects, self._tied(fit.cost))))
                     except FracAccelError:
                         continue
             close = self._tied(min(other.cost for other in [fit, *others]))
@@ -258,8 +257,9 @@ class Search:
                 if pair is None or self.problem.limit.ends_search(
                         "which of two resonances is the sensor's was not tried"):
                     continue
+                effects = {**fit.effects, **{e.cause: e for e in pair}}
                 try:
-                    other = self._at_pace({**fit.effects, **{e.cause: e for e in pair}}, fit.cost)
+                    other = self.problem.fit(effects, goal=_goal(effects, fit.cost))
                 except FracAccelError:
                     continue
                 fit = other if other.cost < fit.cost else fit
@@ -269,12 +269,6 @@ class Search:
         """How far what the model in use leaves open has moved from what it says."""
         return sum(abs(getattr(fit.effects[u.cause], u.name) - getattr(self.base[u.cause], u.name))
                    / u.scale for u in fit.unknowns if u.cause in self.base)
-
-    def _at_pace(self, effects, goal):
-        """A fit of some effects; where a motion is costly, not to the end if no pace to a goal (a
-        cost)."""
-        costly = any(map(acts_on_spring, effects.values()))
-        return self.problem.fit(effects, goal=goal if costly else np.inf)
 
     def _tied(self, cost):
         """Cost up to which a fit ties with one."""
@@ -581,6 +575,12 @@ def acts_as_filter(effect):
     """Whether an effect changes different frequencies differently, if only by a delay."""
     return not effect.is_constant and bool(is_link(effect) or effect.pure_delay_s()
                                            or effect.restates_core)
+
+
+def _goal(effects, cost):
+    """Cost to which a fit of some effects must come at its pace; none where the motion is linear,
+    and cheap enough to be tried in any case."""
+    return cost if any(map(acts_on_spring, effects.values())) else np.inf
 
 
 def _other(core, name):

@@ -64,9 +64,9 @@ class Blocks:
                      for field in dataclasses.fields(cls)[:-1]),
                    float(np.mean([part.excitation for part in parts])))
 
-    def last(self, count):
-        """So many of them."""
-        return Blocks(*(getattr(self, field.name)[-count:]
+    def part(self, rows):
+        """Those of a slice, or of a mask."""
+        return Blocks(*(getattr(self, field.name)[rows]
                         for field in dataclasses.fields(self)[:-1]), self.excitation)
 
     def merged(self, every):

@@ -55,7 +55,7 @@ def onset(blocks, learnt):
     blocks = dataclasses.replace(blocks, power=np.maximum(learnt.left(blocks), 1e-300),
                                  shared=blocks.shared - blocks.gram @ learnt.mean)
     blocks = blocks.about_one_centre()
-    found, is_early = _posterior(blocks.last(_MOST), learnt)
+    found, is_early = _posterior(blocks.part(slice(-_MOST, None)), learnt)
     if is_early and len(blocks.power) > _MOST:
         found, _ = _posterior(blocks.merged(-(-len(blocks.power) // _MOST)), learnt)
     return found

@@ -134,10 +134,7 @@ class Watch:
         except FracAccelError:
             self.skipped += 1
             return None
-        inside = blocks.start_ns < stop_ns - round(BLOCK_S * 0.5e9)
-        blocks = Blocks(*(getattr(blocks, name)[inside] for name in
-                          ("start_ns", "count", "gram", "shared", "power", "centre")),
-                        blocks.excitation)
+        blocks = blocks.part(blocks.start_ns < stop_ns - round(BLOCK_S * 0.5e9))
         self.windows += 1
         window = Window(start_ns, stop_ns, *parts, blocks.excitation, rms)
         self._keep(window, blocks)
