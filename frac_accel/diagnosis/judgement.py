@@ -311,10 +311,10 @@ def _once_each(suspects):
     return [each for each in suspects if first[tuple(each["causes"])] is each]
 
 
-def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise, shown_by):
+def _verdict(engine, best, widest, left, likely, suspects, tied, found, noise, shown_by):
     fraction = _remaining(engine, best, left.noise_rms) if left.share > 0 else 0.0
-    findings, fitted, stds, more = _sure(engine, best, findings, tied, left, fraction)
-    suspects += more
+    findings, fitted, stds, more = _sure(engine, best, likely, tied, left, fraction)
+    suspects = suspects + more
     unnamed = sorted(fitted.causes - {f.cause for f in findings} - engine.search.base.keys())
     complete = fitted.causes >= best.causes
     if not complete:
@@ -358,6 +358,14 @@ def _verdict(engine, best, widest, left, findings, suspects, tied, found, noise,
             # named causes are what they are in the model that is written
             kept = wider.effects
             findings = [_as_kept(f, kept, known) for f in findings]
+    misled = {f.cause for f in likely} & {f.cause for f in findings} & fitted.causes
+    if misled and _misleads(after, account.own, account.before):
+        why = "without what is only suspected, the model with it leaves more of the " \
+              "held-out data than the model in use"
+        return _verdict(
+            engine, best, widest, left, [f for f in likely if f.cause not in misled],
+            suspects + [_suspect({cause}, 0.0, why) for cause in sorted(misled)], tied, found,
+            noise, shown_by)
     named = {f.cause: f.effect for f in findings}
     effects, late = _of_reference(engine, {**fitted.effects, **named, **(kept or described)}, named)
     model = _extended(engine, effects, _stated(engine.problem, fitted, after / account.spread))
@@ -458,24 +466,13 @@ def _sure(engine, best, findings, tied, left, fraction):
                     if f.cause in fitted.effects else f for f in findings]
     words = {**dict.fromkeys(sorted(doubtful), "too much is left that it does not explain"),
              **dropped}
-    if _misleads(engine, fitted):
-        words |= dict.fromkeys(sorted({f.cause for f in findings} & fitted.causes),
-                               "without what is only suspected, the model with it leaves more of "
-                               "the held-out data than the model in use")
-        findings = [f for f in findings if f.cause not in fitted.causes]
-        fitted, stds, _ = _refitted(engine, best, set(), tied)
-        fitted, stds = _with_identified(engine, best, fitted, stds)
     return findings, fitted, stds, [_suspect({cause}, 0.0, why) for cause, why in words.items()]
 
 
-def _misleads(engine, fitted):
-    """Whether a set leaves more of what it has not seen than the model in use, beside what the
-    reference's own noise, which a better model lets through, puts there."""
-    if fitted.causes == engine.search.baseline.causes:
-        return False
-    after, before = (_rms(engine.problem.measured - one.output, engine.held_out_rows)
-                     for one in (engine.learnt(fitted), engine.search.baseline))
-    return after**2 - engine.by_reference(fitted)**2 > (_MISLED * before)**2
+def _misleads(after, own, before):
+    """Whether a model leaves more of what it has not seen than the model in use did (RMS), beside
+    what the reference's own noise, which a better model lets through, puts there."""
+    return after**2 - own**2 > (_MISLED * before)**2
 
 
 class Account(NamedTuple):

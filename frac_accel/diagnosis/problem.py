@@ -280,16 +280,11 @@ class Problem:
 
         Forces of the spring act on the motion as it is, other causes as if there were no such
         forces, and what comes across from the other axes stays as it is: cheap, and right for small
-        ones. A force that holds the mass is none where that hardly moves otherwise: it is simulated
-        where there is no other force.
+        ones.
         """
         linear = {name: other for name, other in effects.items()
                   if not acts_on_spring(other) and name != cause}
         model = self.axis_model(linear)
-        alone = cause not in effects and len(linear) == len(effects)
-        if alone and _holds(effect, model):
-            return self.simulate({**effects, cause: effect}, steps=_STEPS_OF_SLOPES) \
-                - self._remembered(linear, True)
         if acts_on_spring(effect) and type(effect).base_gain is Effect.base_gain:
             motion = self.motion({name: other for name, other in effects.items() if name != cause})
             added = self.force(model, effect, motion)
@@ -307,6 +302,16 @@ class Problem:
         few = cause not in effects and follows_path(effect)
         return self.simulate({**linear, cause: effect}, across,
                              _STEPS_OF_SLOPES if few else _STEPS) - self._remembered(before, across)
+
+    def joined(self, effects, cause, effect):
+        """Change of the output, shape (n,), when a cause joins others, for a screening: to first
+        order, but for a force that holds the mass beside no other. Where that hardly moves
+        otherwise a first order says nothing, and the force is simulated."""
+        if not any(map(acts_on_spring, effects.values())) \
+                and _holds(effect, self.axis_model(effects)):
+            return self.simulate({**effects, cause: effect}, steps=_STEPS_OF_SLOPES) \
+                - self._remembered(effects, True)
+        return self.change(effects, cause, effect)
 
     def force(self, model, effect, motion):
         """First-order response to a force along a motion."""

@@ -411,7 +411,7 @@ class Search:
             later = self._later(fitted.effects, start.lag_s)
             try:
                 change = p.simulate({**fitted.effects, **later, cause: effect}) - fitted.simulated \
-                    if later else p.change(fitted.effects, cause, effect)
+                    if later else p.joined(fitted.effects, cause, effect)
             except FracAccelError:
                 return None
             # a ramp of its own can be far larger than all that it changes besides
