@@ -139,8 +139,8 @@ class Record:
                    for values, other, which in zip(signals, signals[::-1], unknown)]
         for values, guess, which in zip(signals, guesses, unknown):
             values[:, column] = within(guess, self.sampling_rate_hz, self.band_hz, which)
-        # beside a slower reference as filtered: with what lies near its edge, searches took four
-        # times as long, and found the same
+        # beside a slower reference as filtered: the rest of that is its noise, which a law lets
+        # through, and against which a search tries filters (four times as long, the same answer)
         whole = signals[0][:, column] if "sensor" in self.resampled else guesses[0]
         return dataclasses.replace(self, reference=signals[0], sensor=signals[1], unfiltered=whole)
 
