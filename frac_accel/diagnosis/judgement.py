@@ -311,10 +311,10 @@ def _once_each(suspects):
     return [each for each in suspects if first[tuple(each["causes"])] is each]
 
 
-def _verdict(engine, best, widest, left, likely, suspects, tied, found, noise, shown_by):
+def _verdict(engine, best, widest, left, likely, doubted, tied, found, noise, shown_by):
     fraction = _remaining(engine, best, left.noise_rms) if left.share > 0 else 0.0
     findings, fitted, stds, more = _sure(engine, best, likely, tied, left, fraction)
-    suspects = suspects + more
+    suspects = doubted + more
     unnamed = sorted(fitted.causes - {f.cause for f in findings} - engine.search.base.keys())
     complete = fitted.causes >= best.causes
     if not complete:
@@ -364,7 +364,7 @@ def _verdict(engine, best, widest, left, likely, suspects, tied, found, noise, s
               "held-out data than the model in use"
         return _verdict(
             engine, best, widest, left, [f for f in likely if f.cause not in misled],
-            suspects + [_suspect({cause}, 0.0, why) for cause in sorted(misled)], tied, found,
+            doubted + [_suspect({cause}, 0.0, why) for cause in sorted(misled)], tied, found,
             noise, shown_by)
     named = {f.cause: f.effect for f in findings}
     effects, late = _of_reference(engine, {**fitted.effects, **named, **(kept or described)}, named)
