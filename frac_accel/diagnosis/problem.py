@@ -339,7 +339,7 @@ class Problem:
         return kept(self._columns, model.dynamics, self._free_columns, model, most=2)
 
     def _free_columns(self, model):
-        return ShortColumns.of(free_motions(model, self.time, self.used))
+        return ShortColumns.of(*free_motions(model, self.time, self.used))
 
     def own_motions(self, effect):
         """Orthonormal `ShortColumns`: slow motions that a cause of its own may have left."""
@@ -528,11 +528,10 @@ class Problem:
         simulated = self.simulate(effects, steps=_STEPS_OF_SLOPES if rough else _STEPS)
         self._require_bound(simulated)
         columns = self.free_columns(effects)
-        free, back = columns.orthonormal(self.used)
         error = (self.measured - simulated) * self.used
-        components = free.products(error)
-        residual = free.add_to(error, -components)
-        return Point(effects, simulated, columns, free, back @ components, residual,
+        left, free = columns.describing(error, self.used, self._level)
+        residual = columns.add_to(error, -left) * self.used
+        return Point(effects, simulated, columns, free, left, residual,
                      float(residual @ residual) + self._kept_off(effects))
 
     def by_reference(self, effects):
@@ -555,6 +554,11 @@ class Problem:
         if self._passed is None:
             self._passed = self.by_reference({})
         return self.count * max(self._passed - self.by_reference(effects), 0.0)
+
+    @functools.cached_property
+    def _level(self):
+        """RMS of the output, gravity with it."""
+        return float(np.sqrt(np.mean(self.measured[self.used]**2)))
 
     def _require_bound(self, simulated):
         """Refuse an output that is out of all proportion: one that only begins to grow beyond all

@@ -5,8 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
+from ..simulation.free_motion import shares_within
+
 # Share of the largest singular value that counts as none.
 _NONE = 1e-6
+# Share of its bound from which a column is held there.
+_HELD = 1 - 1e-9
 
 
 class ShortColumns(NamedTuple):
@@ -18,23 +22,28 @@ class ShortColumns(NamedTuple):
         Number of all rows, n.
     blocks : list of (ndarray of int, shape (r,); ndarray, shape (r, k))
         Rows and values.
+    most : ndarray, shape (m,), optional
+        Largest size of each, over the level of what they describe; by default anything.
     """
 
     length: int
     blocks: list
+    most: np.ndarray | None = None
 
     @classmethod
-    def of(cls, columns):
+    def of(cls, columns, most=None):
         """The same of columns as they are, in one block."""
         rows = np.flatnonzero(columns.any(axis=1))
-        return cls(len(columns), [(rows, columns[rows])])
+        return cls(len(columns), [(rows, columns[rows])],
+                   np.full(columns.shape[1], np.inf) if most is None else most)
 
     @classmethod
     def in_turn(cls, parts):
         """Those of parts of a record that follow each other, each with columns of its own."""
         begins = np.cumsum([0, *(part.length for part in parts)])
         return cls(int(begins[-1]), [(begin + rows, values) for begin, part in zip(begins, parts)
-                                     for rows, values in part.blocks])
+                                     for rows, values in part.blocks],
+                   np.concatenate([part.most for part in parts]))
 
     @property
     def count(self):
@@ -60,6 +69,21 @@ class ShortColumns(NamedTuple):
             values[rows] += own @ shares[first:first + own.shape[1]]
             first += own.shape[1]
         return values
+
+    def describing(self, values, used, level):
+        """Sizes of the columns, shape (m,), that describe values best where samples count, each at
+        most `most` times a level; and orthonormal columns of those that are not held there."""
+        free, back = self.orthonormal(used)
+        shares = back @ free.products(values)
+        if np.all(np.abs(shares) <= level * self.most):
+            return shares, free
+        found, loose, first = [], [], 0
+        for rows, columns in self.blocks:
+            most, counts = level * self.most[first:first + columns.shape[1]], used[rows]
+            found.append(shares_within(columns[counts], most, values[rows[counts]]))
+            loose.append((rows, columns[:, np.abs(found[-1]) < _HELD * most]))
+            first += len(most)
+        return np.concatenate(found), ShortColumns(self.length, loose).orthonormal(used)[0]
 
     def orthonormal(self, used):
         """Orthonormal columns that span the same space where samples count (elsewhere they are

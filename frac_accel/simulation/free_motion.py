@@ -1,9 +1,10 @@
 """Motions of a sensor that the time before a record may have left: they fade by its poles."""
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from ..errors import FracAccelError
-from ..model.core.oscillator import tail_rates
+from ..model.core.oscillator import tail_rates, tail_sizes
 
 # Logarithm of the size that a fading motion has left where it ends.
 _GONE = -60.0
@@ -11,6 +12,10 @@ _GONE = -60.0
 _FADES = 0.999
 # Size of a fading motion, where samples count, below which it is none.
 _NOTHING = 1e-9
+# Share of the largest singular value below which columns are the same.
+_SEEN = 1e-6
+# Times the output's level (RMS) that the motion before a record may have been.
+_LOUDER = 10.0
 
 
 def free_motions(model, time_s, counted):
@@ -30,18 +35,37 @@ def free_motions(model, time_s, counted):
 
     Returns
     -------
-    ndarray, shape (n, m)
+    columns : ndarray, shape (n, m)
+    most : ndarray, shape (m,)
+        Largest size of each, over the output's level (RMS): without it, decays that stand for a
+        faint memory would follow any drift. Infinite where it may be anything.
     """
     try:
         poles = np.atleast_1d(model.poles())
     except (FracAccelError, ArithmeticError):
         poles = np.array([])
-    core, rates = model.effective_core, []
+    columns, core = fading(poles[poles != 0], time_s, counted), model.effective_core
+    if np.any(poles == 0):
+        columns = np.c_[columns, np.ones(len(time_s)), time_s / time_s[-1]]
+    most = np.full(columns.shape[1], np.inf)
     if getattr(core, "damping_order", 1.0) != 1.0:
         rates = tail_rates(core.natural_frequency_hz, time_s[-1])
-    columns = fading([*(-rate + 0j for rate in rates), *poles[poles != 0]], time_s, counted)
-    return np.c_[columns, np.ones(len(time_s)), time_s / time_s[-1]] if np.any(poles == 0) \
-        else columns
+        for rate, size in zip(rates, tail_sizes(core, rates)):
+            decay = fading([-rate + 0j], time_s, counted)
+            columns = np.c_[columns, decay]
+            most = np.r_[most, [_LOUDER * size] * decay.shape[1]]
+    return columns, most
+
+
+def shares_within(columns, most, values):
+    """Sizes of some columns, shape (m,), that describe values best, each at most so large."""
+    if not columns.size:
+        return np.zeros(columns.shape[1])
+    shares = np.linalg.lstsq(columns, values, rcond=_SEEN)[0]
+    if np.all(np.abs(shares) <= most):
+        return shares
+    basis, products = np.linalg.qr(columns)
+    return lsq_linear(products, basis.T @ values, (-most, most), method="bvls").x
 
 
 def fading(poles, time_s, counted):

@@ -20,15 +20,13 @@ from ..shown import Shown, above
 from ..signals.metrics import ErrorMetrics, error_metrics, interpolate, octave_bands
 from ..signals.thinning import envelope
 from ..simulation import EDGE, simulate
-from ..simulation.free_motion import free_motions
+from ..simulation.free_motion import free_motions, shares_within
 from ..streaming import Corrector
 from ..streaming.batches import restamped
 from .reference import restored
 
 # A stamp that has been moved by a skew and back.
 _ROUNDING_NS = 2
-# Share of the largest free motion from which one counts.
-_SEEN = 1e-6
 # Share of an upper end below which another is less.
 _NEARLY = 0.95
 _WISHES = ("bandwidth_hz", "max_delay_s", "lowest_hz", "tolerance")
@@ -400,7 +398,7 @@ def _simulated(model, pair, column, temperature_at, back):
         counted = np.isfinite(shifted) & inside
         run = _longest_run(counted, instants, pair.sampling_rate_hz)
         return _Outputs(measured, shifted + _begun_before(
-            own, measured - shifted, counted, pair.sampling_rate_hz), counted, run)
+            own, measured, shifted, counted, pair.sampling_rate_hz), counted, run)
     # how it moved before the record is not known: a free mass does not move on by itself
     return min((begun(initial) for initial in ("steady", "rest")),
                key=lambda outputs: outputs.mean_square)
@@ -413,12 +411,12 @@ def _without_stage(model, stage):
     return SensorModel(model.core, (), axes, model.metadata, model.reference_faults)
 
 
-def _begun_before(own, error, counted, rate):
+def _begun_before(own, measured, shifted, counted, rate):
     """What the time before the record has left of an axis' slow motion: as nobody knows it, that
     which fits best where samples count."""
-    free = free_motions(own, np.arange(len(error)) / rate, counted)
-    return free @ np.linalg.lstsq(free[counted], error[counted], rcond=_SEEN)[0] \
-        if free.size else 0.0
+    free, most = free_motions(own, np.arange(len(measured)) / rate, counted)
+    level = np.sqrt(np.mean(measured[counted]**2))
+    return free @ shares_within(free[counted], level * most, (measured - shifted)[counted])
 
 
 def _longest_run(good, stamps_ns, rate):

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 import frac_accel
-from frac_accel.model.core import Gain
+from frac_accel.model.core import Gain, Oscillator
 
 RATE = 200.0
 
@@ -28,6 +28,30 @@ def test_a_high_pass_gets_no_credit_for_a_decay_that_follows_a_wandering_zero(se
     sensor = motion + 0.1 * walk / np.std(walk) + 1e-3 * rng.standard_normal(len(motion))
     assert not {f.cause for f in diagnosed(motion, sensor).findings} & {
         "ac_coupling", "reference_ac_coupling"}
+
+
+@pytest.mark.parametrize("seed", [4102, 4103, 4108])
+def test_fractional_damping_gets_no_credit_for_decays_that_follow_a_wandering_zero(seed):
+    """A lag far above the motion is nearly a delay with a little damping of another order, whose
+    memory of the time before the record could follow any drift if it were as large."""
+    rng, count, rate = np.random.default_rng(seed), 20_000, 2000.0
+    frequency = np.fft.rfftfreq(count, 1 / rate)
+    lines = np.where((frequency > 70) & (frequency < 680), rng.standard_normal(len(frequency))
+                     + 1j * rng.standard_normal(len(frequency)), 0.0)
+    core = Oscillator(rng.uniform(1100, 1400), rng.uniform(0.02, 0.05))
+    corner_hz = rng.uniform(2200, 2800)
+    # the motion repeats, so that the response is exact
+    u = 1j * frequency / core.natural_frequency_hz
+    answered = lines / (u**2 + 2 * core.damping_ratio * u + 1) / (1 + 1j * frequency / corner_hz)
+    motion, sensor = (np.fft.irfft(values, count) for values in (lines, answered))
+    walk = np.cumsum(rng.standard_normal(count))
+    sensor = sensor + np.std(motion) * (0.02 * walk / np.std(walk)
+                                        + 0.004 * rng.standard_normal(count))
+    found = frac_accel.diagnose((motion, sensor), frac_accel.SensorModel(core),
+                                sampling_rate_hz=rate)
+    effects = {f.cause: f.effect for f in found.findings}
+    assert np.isclose(effects["low_pass_lag"].corner_hz, corner_hz, rtol=0.01)
+    assert not effects.keys() & {"fractional_damping", "time_delay", "ac_coupling"}
 
 
 @pytest.mark.parametrize("seed", [4111, 4112, 4113])

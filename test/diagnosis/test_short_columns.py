@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
 from frac_accel.diagnosis.short_columns import ShortColumns
 
@@ -43,3 +44,19 @@ def test_nothing_is_added_where_no_sample_counts():
     assert free.count == 0
     assert back.shape == (2, 0)
     assert np.array_equal(free.add_to(values, free.products(values)), np.ones(4))
+
+
+def test_a_bounded_column_takes_no_more_and_the_others_what_is_left():
+    rng = np.random.default_rng(7)
+    parts = [ShortColumns.of(rng.normal(size=(40, 3)), np.array([np.inf, 0.01, 5.0])),
+             ShortColumns.of(rng.normal(size=(0, 1)), np.array([1.0])),
+             ShortColumns.of(rng.normal(size=(30, 2)), np.array([0.02, np.inf]))]
+    short, used = ShortColumns.in_turn(parts), rng.random(70) > 0.2
+    values, level = rng.normal(size=70) * used, 3.0
+    shares, free = short.describing(values, used, level)
+    dense, most = short.whole() * used[:, None], level * short.most
+    known = lsq_linear(dense, values, (-most, most), method="bvls", tol=1e-14).x
+    assert shares == pytest.approx(known, abs=1e-9)
+    assert free.count == 5 - np.sum(np.abs(shares) > most - 1e-9)
+    # what is not held has taken all that it can
+    assert free.products(values - dense @ shares) == pytest.approx(0, abs=1e-9)

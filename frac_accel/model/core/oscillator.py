@@ -75,3 +75,18 @@ def tail_rates(natural_frequency_hz, duration_s):
     ndarray, shape (8,)
     """
     return np.geomspace(1 / duration_s, 2 * np.pi * natural_frequency_hz, 8)
+
+
+def tail_sizes(core, rates):
+    r"""What earlier motion, as large as 1, can leave of each decay of `tail_rates`, shape (m,).
+
+    What a damping force of order :math:`\nu` remembers is a sum of decays with the density
+
+    .. math:: \frac{|\sin \pi\nu|}{\pi} r^\nu \, \int_0^\infty e^{-rs} q(-s) \, ds
+
+    over the rates r (I. Podlubny, *Fractional Differential Equations* (1999), 2.2 and 2.8, with the
+    kernel as a Laplace transform), and the integral is at most the motion's size over r.
+    """
+    step = np.log(rates[-1] / rates[0]) / (len(rates) - 1)
+    return 2 * core.damping_ratio * abs(np.sin(np.pi * core.damping_order)) / np.pi * step \
+        * (rates / (2 * np.pi * core.natural_frequency_hz))**core.damping_order

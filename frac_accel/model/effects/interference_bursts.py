@@ -110,6 +110,8 @@ def _two_noises(error):
     quiet = _quiet(error)
     loud, share = max(10 * quiet, np.quantile(squares, 0.99)), 0.05
     for _ in range(_PASSES):
+        if not 0 < quiet < loud:  # most of it is nothing, or all of it the same
+            return quiet, loud, 0.0, 0.0
         weight = _weight(squares, quiet, loud, share)
         share = weight.mean()
         if share < 1e-6 or share > 0.999:
