@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from rig.excitation import band_noise
+from rig.oscillator import integrate
 
 from frac_accel.model import AxisModel
 from frac_accel.model.core import Oscillator
 from frac_accel.simulation.free_motion import free_motions, shares_within
-from rig.excitation import band_noise
-from rig.oscillator import integrate
 
 RATE, LASTS_S = 1000.0, 4.0
 
