@@ -331,11 +331,14 @@ def _verdict(engine, best, widest, left, likely, doubted, tied, found, noise, sh
     if any(f.effect.goes_with_size for f in findings):
         left = dataclasses.replace(left, level_score=0.0)
         fraction = fraction if left.share > 0 else 0.0
-    # a core alone, left to err where its record begins, may leave more than the model in use
+    account = _account(engine, fitted, findings, noise)
     bare = engine.search.baseline
-    told = bare if not findings and fitted.cost > bare.cost else fitted
-    account = _account(engine, told, findings, noise)
-    strange = engine.structure(told)
+    if not findings and (fitted.cost > bare.cost or account.after > account.before):
+        # a core alone, left to err where its record begins, may leave more than the model in use,
+        # and so may a constant without a name of what it was not fitted to
+        fitted, stds, unnamed = bare, engine.uncertainties(bare), sorted(other_course)
+        account = _account(engine, fitted, findings, noise)
+    strange = engine.structure(fitted)
     # beside a model that leaves nothing that stands out, what is only suspected is chance, and a
     # hint of structure in what is left is no reason to call the record unexplained
     hint = max(engine.left(fitted).share, sum(share for share, _ in strange))

@@ -231,7 +231,8 @@ class Record:
 
     def integrity(self, column):
         """`Integrity` of an axis of the sensor."""
-        found = self._topics[1].integrity(column, not self.is_on_other_instants("sensor"))
+        found = self._topics[1].integrity(column, not self.is_on_other_instants("sensor"),
+                                          self._topics[0])
         found.words.extend([*self.words, *gravity_words(self.reference[self.valid],
                                                        self.sensor[self.valid])])
         step = self.step("reference", column)

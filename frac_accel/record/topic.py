@@ -15,6 +15,9 @@ from .lattice import lattice_step, stuck_bit
 _FEWEST = 32
 # Scatter of the stamps [sampling intervals] below which it counts as none.
 _JITTER = 2e-4
+# A gap of both topics: half an interval at its ends, which may be jitter; samples that the other
+# one would have in it, at least, to tell; share of them that it may have.
+_EDGE, _TELLS, _EMPTY = 0.5, 2.5, 0.1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,7 +29,7 @@ class Integrity:
     samples : int
         Usable samples.
     missing : int
-        Instants of the topic's clock without a sample.
+        Instants of the topic's clock without a sample, while the other topic has some.
     duplicates, stamps_back, not_finite : int
         Samples that were left out for it.
     jitter_rms_s : float
@@ -166,12 +169,32 @@ class Topic:
             return None if low is None else -low, high
         return self._once("limits", column, find)
 
-    def integrity(self, column, own_instants=True):
-        """`Integrity` of one axis; of values on other instants, what still holds of them."""
+    def paused_with(self, other):
+        """How many of the instants without a sample lie in gaps in which the other topic has none
+        either: the recording paused."""
+        slot = self.clock.slot
+        gaps = np.flatnonzero(np.diff(slot) > 1)
+        if not len(gaps):
+            return 0
+        edge_ns = _EDGE * 1e9 / self.clock.rate_hz
+        begin, end = self.stamps_ns[gaps] + edge_ns, self.stamps_ns[gaps + 1] - edge_ns
+        there = np.searchsorted(other.stamps_ns, end) - np.searchsorted(other.stamps_ns, begin)
+        expected = (end - begin) * 1e-9 * other.clock.rate_hz
+        empty = (there < _EMPTY * expected) & (expected > _TELLS)
+        return int(np.sum(np.diff(slot)[gaps][empty] - 1))
+
+    def integrity(self, column, own_instants=True, other=None):
+        """`Integrity` of one axis; of values on other instants, what still holds of them; of what
+        is missing, what the `other` topic has."""
         clock = self.clock
         jitter = clock.scatter_s if self.scatters else 0.0
         step, (lower, upper) = self.step(column), self.limits(column)
-        words = self._stamp_words(jitter)
+        paused = self.paused_with(other) if other is not None else 0
+        missing = max(self.missing - paused, 0)
+        words = self._stamp_words(jitter, missing)
+        if paused:
+            words.append(several(paused, "instant has", "instants have")
+                         + " a sample of neither topic: the recording paused")
         if step:
             words.append(f"the values are multiples of {step:.6g}")
         stuck = self._once("bit", column, lambda: stuck_bit(self.values[:, column], step))
@@ -181,15 +204,15 @@ class Topic:
         words += at_limits(self.values[:, column], lower, upper)
         if not own_instants:
             step = None
-        return Integrity(len(self), self.missing, self.duplicates,
+        return Integrity(len(self), missing, self.duplicates,
                          self.stamps_back, self.not_finite, jitter, step, lower, upper, words)
 
-    def _stamp_words(self, jitter):
+    def _stamp_words(self, jitter, missing):
         words, clock = [], self.clock
-        if self.missing:
-            total = len(self) + self.missing
-            words.append(several(self.missing, f"of {total} samples is", f"of {total} samples are")
-                         + f" missing ({self.missing / total:.2%})")
+        if missing:
+            total = len(self) + missing
+            words.append(several(missing, f"of {total} samples is", f"of {total} samples are")
+                         + f" missing ({missing / total:.2%})")
         for number, what in ((self.duplicates, "with a stamp that was there before"),
                              (self.stamps_back, "with a stamp that goes back"),
                              (self.not_finite, "with values that are not finite")):
