@@ -20,6 +20,8 @@ _FIRST_PART = 64
 # Length of the mean of stamps on the circle of an interval from which there are instants: 0
 # without, 0.3 where they scatter by a quarter of it.
 _TOGETHER = 0.2
+# Neighbours that must lie together where such a share of the instants has no sample.
+_TOGETHER_IN, _LOST = 128, 0.02
 # Intervals to which a rate is tuned first, and how far it may be off.
 _TUNED, _DETUNED = 256, 0.15
 # Scatter [intervals] of stamps that are as regular as clocks make them, and of those that look
@@ -107,7 +109,8 @@ class Clock:
             if found is not None:
                 return found
         off = np.abs(place - np.median(place))
-        if np.percentile(off, _MOST) > _UNEVEN or np.median(np.diff(slot)) > _TICKS:
+        if _is_without_instants(seconds * rate, slot) or np.percentile(off, _MOST) > _UNEVEN \
+                or np.median(np.diff(slot)) > _TICKS:
             steps = np.diff(merged(seconds))
             return cls("uneven", float(1 / np.percentile(steps, _LONG_STEP)), 0.0,
                        np.empty(0), 0.0)
@@ -125,6 +128,15 @@ class Clock:
         """How many of its stamps scatter each for itself: one of each batch."""
         return len(merged(1e-9 * (stamps_ns - stamps_ns[0]))) if self.kind == "batches" \
             else len(stamps_ns)
+
+
+def _is_without_instants(place, slot):
+    """Whether stamps [intervals] lie anywhere between the instants that they are said to belong to,
+    and many of these have none: not even neighbours lie on instants of their own."""
+    if slot[-1] - slot[0] + 1 < (1 + _LOST) * len(slot) or len(place) < _TOGETHER_IN:
+        return False
+    blocks = place[:len(place) // _TOGETHER_IN * _TOGETHER_IN].reshape(-1, _TOGETHER_IN)
+    return np.mean(np.abs(np.mean(np.exp(2j * np.pi * blocks), axis=1))) < _TOGETHER
 
 
 def require_span(stamps_ns, where):

@@ -35,6 +35,8 @@ _MARGIN = 24
 # of half such an interval or more.
 _TOUCHED = 1.5
 _TOUCHED_LONG = 6.0
+# Share of the instants far from long gaps that must be far from short ones, too, for these to count.
+_CLEAR = 0.5
 # Samples in a row that a spline bridges; a longer gap is crossed by a straight line.
 _SPLINED = 2
 
@@ -186,20 +188,26 @@ def _bridged(values, missing, inside):
 
 
 def untouched(present, rate_hz, start_s, target_hz, target_start_s, count):
-    """Whether each wanted instant is far enough from samples that are not present."""
+    """Whether each wanted instant is far enough from samples that are not present.
+
+    A gap of less than half an interval of the rate that is asked for is bridged by a spline; where
+    there are so many that they would leave little, they do not count.
+    """
     if present.all():
         return np.ones(count, bool)
     interval = rate_hz / min(rate_hz, target_hz)
     place = (target_start_s + np.arange(count) / target_hz - start_s) * rate_hz
     edges = np.flatnonzero(np.diff(np.r_[True, present, True].astype(np.int8)))
     starts, stops = edges[::2], edges[1::2]
-    free = np.ones(count, bool)
     long = stops - starts > interval / 2
+    free = []
     for which, intervals in ((~long, _TOUCHED), (long, _TOUCHED_LONG)):
         gaps = starts[which] - intervals * interval, stops[which] - 1 + intervals * interval
         # no more gaps begin before an instant than have ended
-        free &= np.searchsorted(gaps[0], place) == np.searchsorted(gaps[1], place)
-    return free
+        free.append(np.searchsorted(gaps[0], place) == np.searchsorted(gaps[1], place))
+    clear = free[0] & free[1]
+    # where few instants are left, those count that only lie near single samples that are missing
+    return clear if clear.sum() > _CLEAR * free[1].sum() else free[1]
 
 
 def filled(slot, values):

@@ -44,3 +44,22 @@ def test_uneven_samples_that_were_taken_together_stay_together(seed):
     slope = np.std(np.diff(record.reference[record.valid, 0])) * record.sampling_rate_hz
     assert np.mean(apart) == pytest.approx(0.25, abs=0.01)
     assert np.std(apart) < 2 * abs(lag) * slope + 1e-6
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_loop_that_takes_its_time_is_no_clock_that_loses_samples(seed):
+    """Steps as a busy loop makes them: a sleep, and now and then more work."""
+    rng = np.random.default_rng([971, seed])
+    steps_s = rng.uniform(0.016, 0.018, 20_000) + rng.choice([0.0, 0.009, 0.017], 20_000,
+                                                             p=[0.5, 0.3, 0.2])
+    assert Clock.of(np.round(1e9 * np.cumsum(steps_s)).astype(np.int64)).kind == "uneven"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_clock_that_wanders_and_loses_samples_is_one(seed):
+    rng = np.random.default_rng([972, seed])
+    slot = np.flatnonzero(rng.random(20_000) > rng.uniform(0.03, 0.2))
+    wander = np.interp(slot, np.linspace(0, 20_000, 9), rng.uniform(-2, 2, 9))
+    stamps = slot + wander + rng.normal(0, 0.1, len(slot))
+    assert Clock.of(np.round(1e7 * np.maximum.accumulate(stamps)).astype(np.int64)
+                    + np.arange(len(slot))).kind == "regular"
