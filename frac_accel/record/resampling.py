@@ -35,7 +35,7 @@ _MARGIN = 24
 # of half such an interval or more.
 _TOUCHED = 1.5
 _TOUCHED_LONG = 6.0
-# Share of the instants far from long gaps that must be far from short ones, too, for these to count.
+# Share of the instants far from long gaps that must be far from short ones, for these to count.
 _CLEAR = 0.5
 # Samples in a row that a spline bridges; a longer gap is crossed by a straight line.
 _SPLINED = 2
