@@ -3,13 +3,13 @@
 from unittest import mock
 
 from frac_accel import diagnose
-from frac_accel.diagnosis import judgement
+from frac_accel.diagnosis import verdict
 
 
 def searched(case, **options):
     """Diagnosis of a case, its Engine and its best fit."""
     reference, sensor, celsius = case.samples()
-    with mock.patch.object(judgement.Evidence, "of", wraps=judgement.Evidence.of) as made:
+    with mock.patch.object(verdict.Evidence, "of", wraps=verdict.Evidence.of) as made:
         found = diagnose((reference, sensor), **{"model": case.model(), "temperature": celsius,
                                                  **options})
     engine, best, _, _ = made.call_args.args

@@ -293,6 +293,28 @@ def is_worth_it(before, after, courses):
     return after.cost < _allowed(before.effects, laws) * before.cost
 
 
+def of_another_kind(findings, structure):
+    """Causes of findings of courses beside which much of what is left, by its structure, still
+    changes in their way, with words."""
+    shares = {part: share for share, part in structure}
+    return {f.cause: _another_words(f.effect, shares) for f in findings
+            if _is_another(f.effect, shares)}
+
+
+def _is_another(effect, shares):
+    return shares.get(_own_part(effect), 0.0) > _SAME_KIND
+
+
+def _own_part(effect):
+    """Part of a budget in which a course of another form would be left."""
+    return "slow" if _adds(type(effect)) else "time_varying"
+
+
+def _another_words(effect, shares):
+    return f"{shares[_own_part(effect)]:.0%} of what is left changes with time: the course " \
+           "in time is another one"
+
+
 def findings(engine, fitted, stds):
     """Findings of the courses that a fit has, and those in doubt, in words by cause."""
     p, named, doubtful = engine.problem, [], {}
@@ -303,10 +325,8 @@ def findings(engine, fitted, stds):
         without = p.simulate({c: e for c, e in fitted.effects.items() if c != cause})
         error = (p.measured - fitted.output)[rows]
         g = gain(error + (fitted.simulated - without)[rows], error)
-        part = "slow" if _adds(type(effect)) else "time_varying"
-        if shares.get(part, 0.0) > _SAME_KIND:
-            doubtful[cause] = f"{shares[part]:.0%} of what is left changes with time: the course " \
-                              "in time is another one"
+        if _is_another(effect, shares):
+            doubtful[cause] = _another_words(effect, shares)
         elif g.is_relevant:
             values = _values(effect)
             named.append(Finding(effect, stds.get(cause, {}), certainty(g), [], [

@@ -437,8 +437,14 @@ class Engine:
                 *(values[self._parted] for values in
                   (error, fitted.output + error, fitted.output))).parts}
         own = self._no_fault(fitted)
-        shares = [(entry["share"] - rounded.get(entry["part"], 0.0) - own,
-                   entry["ci95"][0] - rounded.get(entry["part"], 0.0) - own, entry["part"])
+        return self.standing_out(parts, {entry["part"]: rounded.get(entry["part"], 0.0) + own
+                                         for entry in parts})
+
+    @staticmethod
+    def standing_out(parts, less):
+        """As `structure`, of a budget's parts, where some share of each is accounted for."""
+        shares = [(entry["share"] - less.get(entry["part"], 0.0),
+                   entry["ci95"][0] - less.get(entry["part"], 0.0), entry["part"])
                   for entry in parts if entry["part"] != "noise"]
         return sorted(
             ((share, part) for share, low, part in shares

@@ -22,13 +22,13 @@ class ShortColumns(NamedTuple):
         Number of all rows, n.
     blocks : list of (ndarray of int, shape (r,); ndarray, shape (r, k))
         Rows and values.
-    most : ndarray, shape (m,), optional
-        Largest size of each, over the level of what they describe; by default anything.
+    most : ndarray, shape (m,)
+        Largest size of each, over the level of what they describe; infinite where it may be any.
     """
 
     length: int
     blocks: list
-    most: np.ndarray | None = None
+    most: np.ndarray
 
     @classmethod
     def of(cls, columns, most=None):
@@ -83,7 +83,7 @@ class ShortColumns(NamedTuple):
             found.append(shares_within(columns[counts], most, values[rows[counts]]))
             loose.append((rows, columns[:, np.abs(found[-1]) < _HELD * most]))
             first += len(most)
-        return np.concatenate(found), ShortColumns(self.length, loose).orthonormal(used)[0]
+        return np.concatenate(found), _unbounded(self.length, loose).orthonormal(used)[0]
 
     def orthonormal(self, used):
         """Orthonormal columns that span the same space where samples count (elsewhere they are
@@ -96,5 +96,9 @@ class ShortColumns(NamedTuple):
         least = _NONE * max(np.max(sizes, initial=0.0) for _, _, sizes, _ in parts)
         kept = [(rows, vectors[:, sizes > least], sizes[sizes > least], turned[sizes > least])
                 for rows, vectors, sizes, turned in parts]
-        return (ShortColumns(self.length, [(rows, vectors) for rows, vectors, _, _ in kept]),
+        return (_unbounded(self.length, [(rows, vectors) for rows, vectors, _, _ in kept]),
                 block_diag(*(turned.T / sizes for _, _, sizes, turned in kept)))
+
+
+def _unbounded(length, blocks):
+    return ShortColumns(length, blocks, np.full(sum(own.shape[1] for _, own in blocks), np.inf))

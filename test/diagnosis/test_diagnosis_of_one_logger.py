@@ -6,7 +6,7 @@ from rig.oscillator import integrate
 from scipy.signal import butter, sosfiltfilt
 
 from frac_accel import Samples, SensorModel, diagnose
-from frac_accel.diagnosis.judgement import _misleads
+from frac_accel.diagnosis.verdict import _misleads
 
 RATE, FINE = 2000.0, 16
 

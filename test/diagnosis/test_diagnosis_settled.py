@@ -8,7 +8,7 @@ from sampled_pair import sampled_pair
 from scipy.signal import butter, sosfiltfilt
 
 from frac_accel import SensorModel, diagnose
-from frac_accel.diagnosis.judgement import _moved
+from frac_accel.diagnosis.naming import moved
 from frac_accel.model.core import Gain
 
 RATE, FINER, DURATION_S = 100.0, 4, 240.0
@@ -43,4 +43,4 @@ def test_a_zero_that_has_settled_is_named(seed):
 
 def test_what_was_open_and_gave_way_to_another_cause_has_not_moved():
     engine = SimpleNamespace(loose={"sensitivity_error": None})
-    assert _moved(engine, SimpleNamespace(effects={}), {}, "") == ([], {})
+    assert moved(engine, SimpleNamespace(effects={}), {}, "") == ([], {})

@@ -1,0 +1,201 @@
+"""Which names stand in the end, and the model of these alone."""
+
+import contextlib
+import dataclasses
+
+import numpy as np
+from scipy.special import expit
+
+from ..errors import FracAccelError
+from ..model import is_link
+from ..model.effects import IDENTIFIED, fault_of_reference
+from ..model.effects.base import OFFSET
+from .doubts import by_what_is_left, least_lead, left_open, resembles, within_own_delay
+from .engine import WEIGHS
+from .experiments import separating_experiment
+from .finding import Finding
+from .gain import gain
+from .words import gain_words
+
+# Share of the baseline's excess power that may be left where causes are named.
+_LEFT = 0.03
+# Largest deviation of a named cause's strength in parts of a record that holds something else too.
+_STEADY = 0.2
+# Share of what each named cause takes (RMS) up to which another one is minor; of a filter, which
+# may mend what a named one lacks.
+_MINOR, _MINOR_FILTER = 0.1, 0.05
+# Share by which a parameter may move when what is only suspected is left out.
+_OTHERS = 0.25
+# Standard uncertainties from the model's own value by which a parameter has moved.
+_MOVED = 5.0
+
+
+def constants_of(effects):
+    """Causes of some effects that are a common constant: in doubt, it has no name, but it stays.
+
+    Without it gravity bends the gain, and that the rest.
+    """
+    return {cause for cause, effect in effects.items()
+            if effect.everyday and effect.stage == OFFSET}
+
+
+def suspect(causes, margin, reason):
+    return {"causes": sorted(causes), "margin": float(margin), "reason": reason,
+            "experiment": separating_experiment(causes)}
+
+
+def sure(engine, best, findings, tied, left, fraction):
+    """The findings that stand where something is left; the model of these alone, with its
+    uncertainties; and the others as suspects."""
+    doubtful = set()
+    if left.share > 0:
+        # something is left, which the causes may have been bent by, or mistaken for
+        doubtful = {f.cause for f in findings if f.cause in best.effects
+                    and not engine.stands_alone(best, f.cause, f.gain.taken)
+                    and (fraction > _LEFT or engine.unsteadiness(best, f.cause) > _STEADY)}
+    fitted, stds, dropped = refitted(engine, best, {f.cause for f in findings} - doubtful, tied)
+    findings = [f for f in findings if f.cause not in doubtful and f.cause not in dropped]
+    fitted, stds = _with_identified(engine, best, fitted, stds)
+    if fitted.causes != best.causes:
+        findings = [dataclasses.replace(f, effect=fitted.effects[f.cause], std=stds[f.cause])
+                    if f.cause in fitted.effects else f for f in findings]
+    words = {**dict.fromkeys(sorted(doubtful), "too much is left that it does not explain"),
+             **dropped}
+    return findings, fitted, stds, [suspect({cause}, 0.0, why) for cause, why in words.items()]
+
+
+def _with_identified(engine, best, fitted, stds):
+    """A fit with what was identified beside the core, or is common in the best set, where that
+    predicts held-out data better, named or not; and its uncertainties.
+
+    What is named is not bent by it: beside an odd cause only what that would be bent by without
+    it, a constant where there is gravity, and, whatever it gains, a delay where a clock is off: two
+    clocks never start together.
+    """
+    p, delay = engine.problem, IDENTIFIED["delay_s"](0.0)
+    common = {**engine.identified,
+              **{cause: best.effects[cause] for cause in constants_of(best.effects)}}
+    needed = constants_of(common)
+    odd = [cause for cause in fitted.causes - engine.search.base.keys()
+           if not fitted.effects[cause].everyday]
+    effects = fitted.effects.values()
+    if any(effect.clock_ratio() != 1 or effect.time_steps() for effect in effects) \
+            and not any(delay.cause in (effect.cause, effect.mirrors) for effect in effects):
+        # with the orders of filters that were found without it
+        with contextlib.suppress(FracAccelError):
+            fitted = engine.search.to_its_best(
+                engine.search.again({delay.cause: delay, **fitted.effects}))
+            stds = engine.uncertainties(fitted)
+    more = {cause: effect for cause, effect in common.items() if cause not in fitted.effects
+            and (not odd or cause in needed)}
+    if not more:
+        return fitted, stds
+    wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
+    better = gain(*((p.measured - engine.learnt(fit).output)[engine.held_out_rows]
+                    for fit in (fitted, wider)))
+    return (wider, engine.uncertainties(wider)) if better.is_relevant else (fitted, stds)
+
+
+def _are_minor(engine, best, missing, named):
+    """Whether causes without a name take little beside each named one of a set that leaves nothing
+    that stands out: what they stand for is no reason to doubt the others."""
+    if engine.left(best).share > 0 or engine.structure(best):
+        return False
+    least = min(engine.takes(best, cause) for cause in named)
+    return all(engine.takes(best, cause)
+               < (_MINOR_FILTER if is_link(best.effects[cause]) else _MINOR) * least
+               for cause in missing)
+
+
+def refitted(engine, best, named, tied):
+    """The causes that are named, fitted without the others; their uncertainties; and, in words,
+    those that are no longer to be named then.
+
+    What is not named is not in the model. Where the others are only `tied` with rivals (sets by
+    cause) in which the named ones are the same, these stay as they are: with neither, they would
+    be bent. What is minor beside them stays in the model where all is said with it.
+    """
+    base, named, dropped = engine.search.base.keys(), named & best.effects.keys(), {}
+    fitted = best
+    stds = known = engine.uncertainties(best)
+    constant = constants_of(best.effects) - base
+    missing = best.causes - base - named - constant
+    if named and missing and missing <= tied.keys() and all(
+            engine.agrees(best, stds, named, engine.search.fits.get(tied[cause]))
+            for cause in missing):
+        kept = {c: e for c, e in best.effects.items() if c not in missing}
+        return engine.problem.fit(kept, held=kept), stds, {}
+    if named and missing and _are_minor(engine, best, missing, named):
+        return best, stds, {}
+    while True:
+        if named | constant != fitted.causes - base:
+            fitted = engine.search.to_its_best(engine.search.fit(
+                {c: e for c, e in best.effects.items() if c in named | constant or c in base}))
+            stds = engine.uncertainties(fitted)
+            takes = {c: engine.rms(engine.added(fitted, c)) for c in named & fitted.causes}
+            found = {**by_what_is_left(engine, fitted, takes, engine.left(fitted)),
+                     **left_open(engine, fitted, stds, takes),
+                     **{c: "without what is only suspected its parameters are others"
+                        for c in takes if not engine.agrees(best, known, [c], fitted, _OTHERS)},
+                     **dict.fromkeys(named - fitted.causes, "beside the others that are found the "
+                                     "model's motion grows without bound")}
+        elif named and not engine.predicts_better(fitted):
+            found = dict.fromkeys(named, "the causes that are found predict held-out data no "
+                                         "better than the model in use describes them")
+        else:
+            return fitted, stds, dropped
+        named, dropped = named - found.keys(), {**dropped, **found}
+
+
+def moved(engine, best, stds, doubt):
+    """Findings among the causes that were free: farther from the model than it allows for; and
+    those in doubt, with words: all of them where there is a `doubt` already."""
+    findings, doubtful = [], {}
+    for cause, entry in engine.loose.items():
+        effect = best.effects.get(cause)
+        if effect is None:
+            continue  # another cause stands in its place
+        farthest = max(abs(getattr(effect, name) - getattr(entry.effect, name))
+                       / np.hypot(std, stds[cause].get(name, 0.0))
+                       for name, std in entry.std.items())
+        if farthest < _MOVED:
+            continue
+        rows = engine.held_out_rows
+        error = (engine.problem.measured - best.output)[rows]
+        try:
+            held = engine.problem.simulate({**best.effects, cause: entry.effect})
+        except FracAccelError:
+            continue
+        g = gain(error + (best.simulated - held)[rows], error)
+        if not g.is_relevant or g.taken < WEIGHS * engine.unexplained(best):
+            continue
+        words = doubt or resembles(engine, best, effect, g.taken) \
+            or within_own_delay(engine, best, effect) or least_lead(engine, best, effect)
+        other = None if words or not entry.is_known else \
+            engine.instead_of_moved(best, entry.effect)
+        if other:
+            words = f"{other} explains more"
+        mirror = fault_of_reference(effect)  # what no sensor can do
+        if words:
+            doubtful[(mirror or effect).cause] = words
+        else:
+            findings.append(Finding(mirror or effect, stds[cause], confidence(farthest**2), [
+                cause] if mirror else [], [
+                f"{farthest:.3g} standard uncertainties from the model's own value",
+                *gain_words(cause, g, np.inf, [])], g))
+    return findings, doubtful
+
+
+def remaining(engine, fitted, noise_rms):
+    """Share of the power that the model in use leaves beyond the noise which is still left."""
+    count = engine.problem.count
+    excess = max(engine.search.baseline.cost / count - noise_rms**2, 0.0)
+    return max(fitted.cost / count - noise_rms**2, 0.0) / excess if excess > 0 else 0.0
+
+
+def confidence(margin):
+    return float(expit(margin / 2))
+
+
+def rms_of(error, rows):
+    return float(np.sqrt(np.mean(error[rows]**2)))
