@@ -16,8 +16,9 @@ _FEWEST = 32
 # Scatter of the stamps [sampling intervals] below which it counts as none.
 _JITTER = 2e-4
 # A gap of both topics: half an interval at its ends, which may be jitter; samples that the other
-# one would have in it, at least, to tell; share of them that it may have.
-_EDGE, _TELLS, _EMPTY = 0.5, 2.5, 0.1
+# one would have in it, at least, to tell; share of them that it may have. Share of the rate from
+# which a single sample tells.
+_EDGE, _TELLS, _EMPTY, _AS_FAST = 0.5, 2.5, 0.1, 0.9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -178,9 +179,13 @@ class Topic:
             return 0
         edge_ns = _EDGE * 1e9 / self.clock.rate_hz
         begin, end = self.stamps_ns[gaps] + edge_ns, self.stamps_ns[gaps + 1] - edge_ns
-        there = np.searchsorted(other.stamps_ns, end) - np.searchsorted(other.stamps_ns, begin)
+        first, last = (np.searchsorted(other.stamps_ns, instants) for instants in (begin, end))
         expected = (end - begin) * 1e-9 * other.clock.rate_hz
-        empty = (there < _EMPTY * expected) & (expected > _TELLS)
+        # the other one has samples together with those before and after the gap, and none between
+        near = np.r_[-np.inf, other.stamps_ns, np.inf]
+        together = (first == last) & (other.clock.rate_hz > _AS_FAST * self.clock.rate_hz) \
+            & (begin - near[first] < 2 * edge_ns) & (near[last + 1] - end < 2 * edge_ns)
+        empty = together | (last - first < _EMPTY * expected) & (expected > _TELLS)
         return int(np.sum(np.diff(slot)[gaps][empty] - 1))
 
     def integrity(self, column, own_instants=True, other=None):

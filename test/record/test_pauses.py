@@ -49,3 +49,13 @@ def test_a_pause_is_no_finding_and_a_loss_is_one():
                                                    SensorModel(Gain(1.0))).findings]
              for lost in (0, 60)]
     assert names == [[], ["dropped_samples"]]
+
+
+def test_single_samples_that_both_lack_are_lost_by_the_recording():
+    (reference, sensor), paused = topics(13)
+    kept = np.ones(len(sensor.stamps_ns), bool)
+    kept[np.random.default_rng(13).choice(np.arange(10, 900), 20, replace=False)] = False
+    both = [frac_accel.Samples.of(each.stamps_ns[kept], each.values[kept])
+            for each in (reference, sensor)]
+    assert Record.of(*both).integrity(0).missing == 0
+    assert Record.of(reference, both[1]).integrity(0).missing == 20
