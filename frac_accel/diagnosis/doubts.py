@@ -156,6 +156,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
     for cause, words in {**_parts_of_a_law(best, takes, added, left),
                          **_beside_a_strong_force(engine, best, takes, left, noise),
                          **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
+                         **_of_other_axes(engine, best),
                          **_at_the_edge(engine, best), **_hardly_rings(engine, best),
                          **_out_of_sight(engine, best),
                          **_rings_otherwise(engine, best, takes, noise),
@@ -576,6 +577,20 @@ def _out_of_sight(engine, best):
             found[cause] = f"its corner, {corners.min():.3g} Hz, lies beyond what is compared " \
                            f"({edge:.3g} Hz): there many filters, and cores, do the same"
     return found
+
+
+def _of_other_axes(engine, best):
+    """Causes that have nothing to do with the motion along their axis, but may have with another
+    one's."""
+    apart = {cause: effect for cause, effect in best.effects.items()
+             if type(effect).may_be_of is not Effect.may_be_of}
+    p = engine.problem
+    others = [p.response(i) for i in range(3) if apart and i != p.axis
+              and np.ptp(p.record.reference[:, i])]
+    others = [np.where(p.used, motion - motion[p.used].mean(), 0.0) for motion in others]
+    return {cause: "another axis moves like that: what crosses over from there looks the same"
+            for cause, effect in apart.items()
+            if any(effect.may_be_of(motion, p.time) for motion in others)}
 
 
 def _hardly_rings(engine, best):

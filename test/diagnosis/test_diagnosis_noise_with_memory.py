@@ -80,6 +80,30 @@ def test_the_harmonics_of_a_hum_say_nothing_against_it(seed):
     assert np.isclose(found["tone_interference"].frequency_hz, hum_hz, rtol=1e-4)
 
 
+@pytest.mark.parametrize("seed", [4141, 4142, 4143])
+def test_a_line_of_another_axis_is_no_tone_from_elsewhere(seed):
+    """A lightly damped part that another axis' motion sets in motion: it picks one line of it."""
+    rng = np.random.default_rng(seed)
+    count = 8000
+    frequency = np.fft.rfftfreq(count, 1 / RATE)
+    lines = np.zeros((2, len(frequency)), complex)
+    # every twentieth line, so that each axis repeats, and each has its own
+    for axis in range(2):
+        chosen = np.arange(80 + 10 * axis, 1600, 20)
+        lines[axis, chosen] = rng.uniform(0.3, 1, len(chosen)) * np.exp(
+            2j * np.pi * rng.random(len(chosen)))
+    rings_hz = frequency[90 + 20 * rng.integers(30, 50)]
+    ratio = 1j * frequency / rings_hz
+    crosses = 0.002 * ratio**2 / (ratio**2 + 2 * 0.003 * ratio + 1)
+    motion, other = np.fft.irfft(lines, count)
+    scale = np.std(motion)
+    reference = np.c_[motion, other, np.zeros(count)] / scale
+    sensor = reference.copy()
+    sensor[:, 0] += np.fft.irfft(lines[1] * crosses, count) / scale
+    sensor[:, :2] += 1e-3 * rng.standard_normal((count, 2))
+    assert "tone_interference" not in {f.cause for f in diagnosed(reference, sensor).findings}
+
+
 @pytest.mark.parametrize("seed", [4131, 4132, 4133])
 def test_a_rattle_above_a_level_is_no_scatter_of_the_instants(seed):
     rng = np.random.default_rng(seed)

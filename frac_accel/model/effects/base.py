@@ -345,6 +345,11 @@ class Effect:
         says nothing against it."""
         return 0.0
 
+    def may_be_of(self, motion, time_s):
+        """Whether what this effect adds may be another axis' motion, shape (n,), that crosses over,
+        though it has nothing to do with the axis' own."""
+        return False
+
     def std_by_stamps(self, record):
         """Standard uncertainties by parameter that a record's stamps leave, whatever is fitted."""
         return {}

@@ -12,6 +12,9 @@ from .fit_starts import finite, strongest_line
 _RELATIVE_WIDTH = 3e-4
 # Lines on either side beside which it is seen.
 _LINES = 10
+# Times as strong as the lines beside it, and share of it that a tone must be at most, where another
+# axis' motion may make it.
+_LINE, _CROSSED = 10.0, 1.0
 # The highest harmonic that is taken for a part of the tone.
 _HARMONICS = 10
 
@@ -60,6 +63,16 @@ class ToneInterference(Effect):
         apart = np.arange(-_LINES, _LINES + 1) / (time_s[-1] - time_s[0])
         lines = [np.mean(residual * np.exp(-(self.frequency_hz + off) * turns)) for off in apart]
         return float(np.sqrt(2) * np.linalg.norm(lines))
+
+    def may_be_of(self, motion, time_s):
+        # a line of its own at this frequency; the window keeps strong ones from spreading to it
+        window = np.hanning(len(motion)) * motion
+        apart = np.arange(-_LINES, _LINES + 1) / (time_s[-1] - time_s[0])
+        lines = np.abs([np.mean(window * np.exp(-2j * np.pi * (self.frequency_hz + off) * time_s))
+                        for off in apart])
+        beside = np.sqrt(np.mean(lines[np.abs(np.arange(-_LINES, _LINES + 1)) > 2]**2))
+        # of the window, half the mean is lost
+        return lines[_LINES] > _LINE * beside and self.amplitude < _CROSSED * 4 * lines[_LINES]
 
     def _tone(self, circumstances):
         phase = 2 * np.pi * self.frequency_hz * circumstances.time_s + self.phase_rad
