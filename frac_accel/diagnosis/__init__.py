@@ -18,6 +18,7 @@ from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC
 from ..model import AXES, SensorModel
 from ..model.core import Gain, Oscillator
 from ..model.effects import known_effects
+from ..model.effects.base import INTERFERENCE
 from ..record import Record
 from ..record.clipping import at_limits
 from ..record.orientation import Orientation, turned_away
@@ -567,9 +568,22 @@ def _require_relation(engine, axis, seed):
     follows, share = related(p.measured, start, p.used)
     if follows or _related_in_fast_motion(p.measured, start, p.used)[0]:
         return
+    if _related_beside_interference(engine, start):
+        return
     hint = turned_away(p.record, axis) or "they do not belong together"
     raise FracAccelError(f"axis {axis}: the sensor does not follow the reference (they share "
                          f"{max(share, 0):.2%} of the power); {hint}")
+
+
+def _related_beside_interference(engine, start):
+    """Whether a sensor follows the reference once what is louder than the motion, and has nothing
+    to do with it, is taken off."""
+    search, p = engine.search, engine.problem
+    bare = search.baseline
+    fits = search.fit_all([search.begun(bare, cause, begin) for _, cause, begin in
+                           search.screen(bare) if begin.stage == INTERFERENCE])
+    return any(related(p.measured - engine.added(fit, cause), start, p.used)[0]
+               for fit in fits for cause in fit.causes - bare.causes)
 
 
 def _require_direction(engine, axis, start):

@@ -111,3 +111,15 @@ def test_a_rattle_above_a_level_is_no_scatter_of_the_instants(seed):
     loud = np.abs(motion) > rng.uniform(1.5, 2.0) * np.std(motion)
     sensor = motion + np.std(motion) * (0.03 * loud + 1e-3) * rng.standard_normal(len(motion))
     assert "sampling_jitter" not in {f.cause for f in diagnosed(motion, sensor).findings}
+
+
+@pytest.mark.parametrize("seed", [4151, 4152])
+def test_a_hum_far_louder_than_the_motion_hides_no_relation(seed):
+    rng = np.random.default_rng(seed)
+    motion, time = band(rng, 8000, 2.0, 40.0), np.arange(8000) / RATE
+    hum = 10 * np.std(motion) * np.sin(2 * np.pi * rng.uniform(45, 60) * time)
+    noise = 1e-3 * rng.standard_normal(len(time))
+    assert [f.cause for f in diagnosed(motion, motion + hum + noise).findings] == [
+        "tone_interference"]
+    with pytest.raises(frac_accel.FracAccelError, match="does not follow"):
+        diagnosed(motion, band(rng, 8000, 2.0, 40.0) + hum + noise)
