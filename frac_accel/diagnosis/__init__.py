@@ -36,7 +36,7 @@ from .read_off import drowned
 from .screened import screened
 from .search import is_nonlinear
 from .spikes import spikes, spikes_words
-from .sprung import beside_spring, is_bent, is_better, oscillator_of
+from .sprung import beside_spring, is_better, may_hide_one, oscillator_of
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
 from .stretches import MOST, strongest_part
 from .time_limit import TimeLimit
@@ -187,7 +187,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         found.words.append(spikes_words(engine.spikes.sum()))
     _require_relation(engine, axis, seed)
     begin, engine, best = _searched(begin, engine, seed)
-    if not is_stated and is_bent(engine, best):
+    if not is_stated and may_hide_one(engine, best):
         begin, engine, best, seed = _with_a_spring(begin, engine, best, seed, engine_of, record)
     begin, engine, best = _with_a_course(begin, engine, best, seed)
     if engine.part is None:
@@ -314,8 +314,9 @@ def _with_a_spring(begin, engine, best, seed, engine_of, record):
                                      engine, engine.search.courses)
     other.search.candidates = beside_spring(engine, best)
     own_best = other.run(own_seed)
-    return (own_begin, other, own_best, own_seed) if is_better(best, own_best) \
-        else (begin, engine, best, seed)
+    if is_better(best, own_best, (other.part or other).noise_only(own_best)):
+        return own_begin, other, own_best, own_seed
+    return begin, engine, best, seed
 
 
 def _searched(begin, engine, seed):

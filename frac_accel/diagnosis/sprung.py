@@ -1,25 +1,30 @@
-"""Whether what a gain leaves, which is bent, is the spring of an oscillator that it hides."""
+"""Whether a gain hides an oscillator: by what it leaves, or by what it takes to imitate one."""
 
 import dataclasses
 
 from ..errors import IdentificationError
-from ..model import AXES, SensorModel
+from ..model import AXES, SensorModel, is_link
 from ..model.core import Gain
 from ..model.effects import known_effects
 from .stretches import MOST, strongest_part
 
 # Share of what is left that must be even or odd, relative uncertainty up to which a natural
 # frequency is known, and share of the residual power that an oscillator with its causes may leave.
-_BENT, _KNOWN, _LESS = 0.5, 0.1, 0.5
+_BENT, _KNOWN, _LESS = 0.5, 0.2, 0.5
 _PARTS = ("even", "odd")
 
 
-def is_bent(engine, best):
-    """Whether a gain leaves what is mainly nonlinear, for which it has no cause."""
+def may_hide_one(engine, best):
+    """Whether a gain leaves what is mainly nonlinear, for which it has no cause, or its filters do
+    not suffice: they leave what is linear, or lie at the ends of what was searched."""
     core = engine.problem.baseline.axis(engine.problem.axis).core
+    if not isinstance(core, Gain):
+        return False
     searched = engine.part or engine
-    return isinstance(core, Gain) and sum(
-        share for share, part in searched.structure(best) if part in _PARTS) > _BENT
+    structure = searched.structure(best)
+    return sum(share for share, part in structure if part in _PARTS) > _BENT or (
+        any(is_link(effect) for effect in best.effects.values())
+        and (any(part == "linear" for _, part in structure) or searched.hollow(best)))
 
 
 def oscillator_of(record, axis, used):
@@ -49,6 +54,8 @@ def beside_spring(engine, best):
                                         or cause in best.effects)]
 
 
-def is_better(best, other):
-    """Whether a fit with an oscillator leaves far less than one with a gain."""
-    return other.cost < _LESS * best.cost
+def is_better(best, other, leaves_noise):
+    """Whether a fit with an oscillator leaves far less than one with a gain; or less with no more
+    parameters, and nothing but noise."""
+    enough = 1.0 if leaves_noise and other.size <= best.size else _LESS
+    return other.cost < enough * best.cost
