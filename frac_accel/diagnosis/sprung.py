@@ -21,6 +21,8 @@ def may_hide_one(engine, best):
     if not isinstance(core, Gain):
         return False
     searched = engine.part or engine
+    if searched.noise_only(best):
+        return False
     structure = searched.structure(best)
     return sum(share for share, part in structure if part in _PARTS) > _BENT or (
         any(is_link(effect) for effect in best.effects.values())
