@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import block_diag
 
-from ..simulation.free_motion import shares_within
+from ..simulation.free_motion import at_level, shares_within
 
 # Share of the largest singular value that counts as none.
 _NONE = 1e-6
@@ -75,13 +75,13 @@ class ShortColumns(NamedTuple):
         most `most` times a level; and orthonormal columns of those that are not held there."""
         free, back = self.orthonormal(used)
         shares = back @ free.products(values)
-        if np.all(np.abs(shares) <= level * self.most):
+        if np.all(np.abs(shares) <= at_level(self.most, level)):
             return shares, free
         found, loose, first = [], [], 0
         for rows, columns in self.blocks:
-            most, counts = level * self.most[first:first + columns.shape[1]], used[rows]
-            found.append(shares_within(columns[counts], most, values[rows[counts]]))
-            loose.append((rows, columns[:, np.abs(found[-1]) < _HELD * most]))
+            most, counts = self.most[first:first + columns.shape[1]], used[rows]
+            found.append(shares_within(columns[counts], most, level, values[rows[counts]]))
+            loose.append((rows, columns[:, np.abs(found[-1]) < _HELD * at_level(most, level)]))
             first += len(most)
         return np.concatenate(found), _unbounded(self.length, loose).orthonormal(used)[0]
 

@@ -21,12 +21,11 @@ def may_hide_one(engine, best):
     if not isinstance(core, Gain):
         return False
     searched = engine.part or engine
-    if searched.noise_only(best):
-        return False
     structure = searched.structure(best)
-    return sum(share for share, part in structure if part in _PARTS) > _BENT or (
-        any(is_link(effect) for effect in best.effects.values())
-        and (any(part == "linear" for _, part in structure) or searched.hollow(best)))
+    if sum(share for share, part in structure if part in _PARTS) > _BENT:
+        return True
+    return not searched.noise_only(best) and any(map(is_link, best.effects.values())) and (
+        any(part == "linear" for _, part in structure) or searched.hollow(best))
 
 
 def oscillator_of(record, axis, used):

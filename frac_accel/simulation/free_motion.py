@@ -14,6 +14,8 @@ _FADES = 0.999
 _NOTHING = 1e-9
 # Share of the largest singular value below which columns are the same.
 _SEEN = 1e-6
+# Largest size, where the output is nothing.
+_LEAST = 1e-300
 # Times the output's level (RMS) that the motion before a record may have been.
 _LOUDER = 10.0
 
@@ -57,15 +59,22 @@ def free_motions(model, time_s, counted):
     return columns, most
 
 
-def shares_within(columns, most, values):
-    """Sizes of some columns, shape (m,), that describe values best, each at most so large."""
+def shares_within(columns, most, level, values):
+    """Sizes of some columns, shape (m,), that describe values best, each at most `most` times a
+    level."""
     if not columns.size:
         return np.zeros(columns.shape[1])
     shares = np.linalg.lstsq(columns, values, rcond=_SEEN)[0]
+    most = at_level(most, level)
     if np.all(np.abs(shares) <= most):
         return shares
     basis, products = np.linalg.qr(columns)
     return lsq_linear(products, basis.T @ values, (-most, most), method="bvls").x
+
+
+def at_level(most, level):
+    """Largest sizes at a level, whatever that is: above zero, and infinite where nothing bounds."""
+    return np.where(np.isfinite(most), np.maximum(level * np.nan_to_num(most), _LEAST), np.inf)
 
 
 def fading(poles, time_s, counted):

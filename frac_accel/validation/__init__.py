@@ -416,7 +416,7 @@ def _begun_before(own, measured, shifted, counted, rate):
     which fits best where samples count."""
     free, most = free_motions(own, np.arange(len(measured)) / rate, counted)
     level = np.sqrt(np.mean(measured[counted]**2))
-    return free @ shares_within(free[counted], level * most, (measured - shifted)[counted])
+    return free @ shares_within(free[counted], most, level, (measured - shifted)[counted])
 
 
 def _longest_run(good, stamps_ns, rate):

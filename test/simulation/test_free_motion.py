@@ -26,12 +26,12 @@ def test_a_tail_stays_within_its_bounds_and_a_drift_does_not(seed):
     columns, most = free_motions(AxisModel(Oscillator(f0, zeta, order), ()), time_s,
                                  np.ones(len(after), bool))
     level = np.sqrt(np.mean(before**2))
-    left = after - columns @ shares_within(columns, level * most, after)
+    left = after - columns @ shares_within(columns, most, level, after)
     assert np.std(left) < 1e-4 * level
 
     # a drift as large as the motion is no memory of it
     drift = level * np.sin(2 * np.pi * time_s / time_s[-1])
-    left = drift - columns @ shares_within(columns, level * most, drift)
+    left = drift - columns @ shares_within(columns, most, level, drift)
     loose = drift - columns @ np.linalg.lstsq(columns, drift, rcond=1e-6)[0]
     assert np.std(loose) < 0.5 * np.std(drift)
     assert np.std(left) > 0.8 * np.std(drift)
