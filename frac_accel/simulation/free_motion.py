@@ -74,7 +74,9 @@ def shares_within(columns, most, level, values):
 
 def at_level(most, level):
     """Largest sizes at a level, whatever that is: above zero, and infinite where nothing bounds."""
-    return np.where(np.isfinite(most), np.maximum(level * np.nan_to_num(most), _LEAST), np.inf)
+    bounds, bounded = np.full(len(most), np.inf), np.isfinite(most)
+    bounds[bounded] = np.maximum(level * most[bounded], _LEAST)
+    return bounds
 
 
 def fading(poles, time_s, counted):
