@@ -40,6 +40,7 @@ def constants_of(effects):
 
 
 def suspect(causes, margin, reason):
+    """Causes that are not named, as a result has them."""
     return {"causes": sorted(causes), "margin": float(margin), "reason": reason,
             "experiment": separating_experiment(causes)}
 
@@ -194,8 +195,10 @@ def remaining(engine, fitted, noise_rms):
 
 
 def confidence(margin):
+    """That of a lead by so many variances of the noise."""
     return float(expit(margin / 2))
 
 
 def rms_of(error, rows):
+    """RMS of some rows."""
     return float(np.sqrt(np.mean(error[rows]**2)))

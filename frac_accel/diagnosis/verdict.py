@@ -190,13 +190,12 @@ def _taken_back(engine, likely, named, described):
     if own and _misleads(described.after, account.own, account.before):
         return dict.fromkeys(sorted(own), "without what is only suspected, the model with it "
                              "leaves more of the held-out data than the model in use")
-    if described.output is None:
+    along = [f for f in described.findings if f.cause in engine.search.courses]
+    if described.output is None or not along:
         return {}
     p = engine.problem
     left = engine.budget_between(p.measured, described.output, p.record.valid)
-    return courses.of_another_kind(
-        [f for f in described.findings if f.cause in engine.search.courses],
-        engine.standing_out(left.parts, {}))
+    return courses.of_another_kind(along, engine.standing_out(left.parts, {}))
 
 
 def _told(engine, likely, named, described, found):

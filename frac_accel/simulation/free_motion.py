@@ -52,10 +52,10 @@ def free_motions(model, time_s, counted):
     most = np.full(columns.shape[1], np.inf)
     if getattr(core, "damping_order", 1.0) != 1.0:
         rates = tail_rates(core.natural_frequency_hz, time_s[-1])
-        for rate, size in zip(rates, tail_sizes(core, rates)):
-            decay = fading([-rate + 0j], time_s, counted)
-            columns = np.c_[columns, decay]
-            most = np.r_[most, [_LOUDER * size] * decay.shape[1]]
+        decays = [fading([-rate + 0j], time_s, counted) for rate in rates]
+        columns = np.hstack([columns, *decays])
+        most = np.r_[most, _LOUDER * np.repeat(tail_sizes(core, rates),
+                                               [decay.shape[1] for decay in decays])]
     return columns, most
 
 

@@ -59,20 +59,21 @@ class ToneInterference(Effect):
 
     def beside(self, residual, time_s):
         # the lines next to its own
-        turns = 2j * np.pi * time_s
-        apart = np.arange(-_LINES, _LINES + 1) / (time_s[-1] - time_s[0])
-        lines = [np.mean(residual * np.exp(-(self.frequency_hz + off) * turns)) for off in apart]
-        return float(np.sqrt(2) * np.linalg.norm(lines))
+        return float(np.sqrt(2) * np.linalg.norm(self._lines_around(residual, time_s)))
 
     def may_be_of(self, motion, time_s):
         # a line of its own at this frequency; the window keeps strong ones from spreading to it
-        window = np.hanning(len(motion)) * motion
-        apart = np.arange(-_LINES, _LINES + 1) / (time_s[-1] - time_s[0])
-        lines = np.abs([np.mean(window * np.exp(-2j * np.pi * (self.frequency_hz + off) * time_s))
-                        for off in apart])
-        beside = np.sqrt(np.mean(lines[np.abs(np.arange(-_LINES, _LINES + 1)) > 2]**2))
+        lines = np.abs(self._lines_around(np.hanning(len(motion)) * motion, time_s))
+        away = np.abs(np.arange(-_LINES, _LINES + 1))
+        beside = np.sqrt(np.mean(lines[away > 2]**2))
         # of the window, half the mean is lost
         return lines[_LINES] > _LINE * beside and self.amplitude < _CROSSED * 4 * lines[_LINES]
+
+    def _lines_around(self, values, time_s):
+        """Lines of values, shape (n,), at the tone's frequency and on either side."""
+        turns = 2j * np.pi * time_s
+        apart = np.arange(-_LINES, _LINES + 1) / (time_s[-1] - time_s[0])
+        return [np.mean(values * np.exp(-(self.frequency_hz + off) * turns)) for off in apart]
 
     def _tone(self, circumstances):
         phase = 2 * np.pi * self.frequency_hz * circumstances.time_s + self.phase_rad
