@@ -16,6 +16,7 @@ from ..model.effects import effect_of
 from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
+from .other_axes import UNLIKE
 from .problem import Problem, acts_on_spring
 from .search import Search
 from .seen import added, grows_with_motion
@@ -85,10 +86,10 @@ class Engine:
     """
 
     def __init__(self, record, axis, baseline, used, base=None, candidates=(), stages=None,
-                 step=None, limit=None, passed_on=None, loose=None, in_own_core=()):
+                 step=None, limit=None, passed_on=None, loose=None, others=UNLIKE):
         slices, given = stretches_of(record, axis), (record, axis, baseline, used, limit)
-        self.problem = Stretches(*given, slices, in_own_core) if slices[1:] else \
-            Problem(*given, in_own_core)
+        self.problem = Stretches(*given, slices, others) if slices[1:] else \
+            Problem(*given, others)
         self.problem.passed_on = passed_on
         self.part = None
         # `Integrity` of the record, where what it shows by itself is looked for
@@ -163,7 +164,7 @@ class Engine:
             self.part = Engine(p.part(rows), p.axis, p.baseline, p.taken(self.wanted)[rows],
                                self.search.base, self.search.candidates, self.search.stages,
                                self._step, p.limit.of_part(), p.passed_on, self.loose,
-                               p.in_own_core)
+                               p.others)
             self.part.identified, self.part.found = self.identified, self.found
             self.part.search.courses = self.search.courses
             return self.part.run(seed)
@@ -224,6 +225,10 @@ class Engine:
                                     + [best.effects])
             variance = best.cost / self.problem.count \
                 * noise_peak(best.residual, self.problem.used)
+            for rival in [fit for fit in self.search.fits.values() if fit.causes != best.causes
+                          and abs(self.score(fit, variance) - self.score(best, variance)) < _SAME]:
+                # what says the same may do so with less beside it
+                self.search.prune(rival, self.threshold)
             near = sorted((fit for fit in self.search.fits.values()
                            if len(fit.effects) <= len(best.effects)
                            and not fit.causes & unwanted),

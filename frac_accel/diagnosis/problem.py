@@ -17,6 +17,7 @@ from ..signals.kept import kept
 from ..simulation import EDGE, AxisSimulator
 from ..simulation.free_motion import fading, free_motions
 from .in_band import InBand
+from .other_axes import UNLIKE, is_of_all_if_alike
 from .short_columns import ShortColumns
 from .time_limit import TimeLimit
 
@@ -171,13 +172,13 @@ class Problem:
     used : ndarray of bool, shape (n,)
         Samples that count.
     limit : TimeLimit, optional
-    in_own_core : sequence of str
-        Causes that say what a core is that nobody has stated: it is that of all axes.
+    others : OtherAxes
+        Which causes the other axes have as well.
     """
 
-    def __init__(self, record, axis, baseline, used, limit=None, in_own_core=()):
+    def __init__(self, record, axis, baseline, used, limit=None, others=UNLIKE):
         self.record, self.axis, self.baseline = record, axis, baseline
-        self.in_own_core = in_own_core
+        self.others = others
         # `ReferenceNoise` that counts behind no filter, and its power behind the model in use
         self.passed_on = self._passed = None
         self.limit = limit or TimeLimit()
@@ -195,7 +196,7 @@ class Problem:
         """Keep nothing that has been simulated; it is made again when asked for."""
         self._simulators = {}
         self._last, self._moved, self._others = (None, None), (None, None), {}
-        self._columns = {}
+        self._columns, self._mixings = {}, {}
 
     @property
     def count(self):
@@ -263,8 +264,7 @@ class Problem:
         These have the model in use, and of the causes only what is the same for all axes.
         """
         total = np.zeros(len(self.record))
-        common = {cause: effect for cause, effect in effects.items()
-                  if effect.common_to_axes or cause in self.in_own_core}
+        common = self.of_all_axes(effects)
         for other, share in enumerate(shares):
             if other == self.axis or not share or not np.ptp(self.record.reference[:, other]):
                 continue
@@ -275,12 +275,16 @@ class Problem:
                 self.simulator(other, _STEPS_OF_SLOPES).simulate, AxisModel(model.core, before))
         return total
 
+    def of_all_axes(self, effects):
+        """Of these causes, by name, what the other axes have as well."""
+        return {cause: effect for cause, effect in effects.items() if self.others.have(effect)}
+
     def change(self, effects, cause, effect):
         """First-order change of the output, shape (n,), when a cause is added or changed.
 
         Forces of the spring act on the motion as it is, other causes as if there were no such
-        forces, and what comes across from the other axes stays as it is: cheap, and right for small
-        ones.
+        forces, and what comes across from the other axes stays as it is where they do not have the
+        cause: cheap, and right for small ones.
         """
         linear = {name: other for name, other in effects.items()
                   if not acts_on_spring(other) and name != cause}
@@ -297,7 +301,7 @@ class Problem:
                         added, self.simulator(self.axis).circumstances)
             return added
         before = {**linear, cause: effects[cause]} if cause in effects else linear
-        across = effect.stage == CROSS_AXIS
+        across = effect.stage == CROSS_AXIS or (self.others.alike and is_of_all_if_alike(effect))
         # where all of a path is new, few steps show as much as a first order is worth
         few = cause not in effects and follows_path(effect)
         return self.simulate({**linear, cause: effect}, across,
@@ -387,9 +391,11 @@ class Problem:
         """Effects of a fit, with its instants where the whole record has them."""
         return fit.effects
 
-    def response(self, axis):
-        """Output of one axis of the model in use, before its effects on the samples, shape (n,)."""
-        return self.simulator(axis).respond(self.baseline.axis(axis))
+    def response(self, axis, links=()):
+        """Output of one axis of the model in use, with effects that all axes have, before those on
+        the samples, shape (n,)."""
+        return self.simulator(axis).respond(
+            self.axis_model({effect.cause: effect for effect in links}, axis))
 
     def mirrored(self):
         """The same problem with the reference turned round."""
@@ -685,16 +691,21 @@ class Problem:
         """What is small or large in this record."""
         return Scales(float(np.std(self.measured[self.used])), self.rate, float(self.time[-1]))
 
-    @functools.cached_property
-    def mixing(self):
-        """How much of each axis is in each other one, by least squares on the model in use.
+    def mixing(self, effects):
+        """How much of each axis is in each other one, by least squares on the model in use with
+        what these effects say of all axes.
 
         Matrix, shape (3, 3): row i has the shares of the axes' simulated outputs in the measured
         axis i, NaN where either does not move; and the standard uncertainties as for white noise.
         """
+        links = tuple(effect for effect in self.of_all_axes(effects).values()
+                      if is_of_all_if_alike(effect))
+        return kept(self._mixings, links, self._mixing, links, most=2)
+
+    def _mixing(self, links):
         moving = [axis for axis in range(3) if np.ptp(self.record.reference[:, axis])]
         shares, stds = np.full((2, 3, 3), np.nan)
-        columns = [self.response(axis)[self.used] for axis in moving]
+        columns = [self.response(axis, links)[self.used] for axis in moving]
         basis = np.stack([*columns, np.ones(self.count)], axis=1)
         inverse = np.linalg.pinv(basis.T @ basis)
         for axis in range(3):

@@ -293,7 +293,7 @@ class Search:
                     celsius is not None and np.ptp(celsius) > 0.1,
                     p.excited,
                     "xyz"[p.axis],
-                    p.mixing,
+                    p.mixing(fitted.effects),
                     self._open_core(fitted, own),
                     isinstance(own, Oscillator) and not any(
                         acts_on_spring(e) or follows_path(e) or (is_link(e) and not e.is_constant)

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from ..identification.response.excitation import strongest_stretch
+from .other_axes import UNLIKE
 from .problem import Problem
 from .short_columns import ShortColumns
 
@@ -48,17 +49,17 @@ class Stretches(Problem):
     record, axis, baseline, used, limit
         As for `Problem`, of the whole record.
     slices : list of slice
-    in_own_core : sequence of str
+    others : OtherAxes
         As for `Problem`.
     """
 
-    def __init__(self, record, axis, baseline, used, limit, slices, in_own_core=()):
+    def __init__(self, record, axis, baseline, used, limit, slices, others=UNLIKE):
         self.slices, self._whole, self._dated = slices, (record, used), {}
         self.parts = []
         super().__init__(_joined(record, slices), axis, baseline, self.taken(used), limit,
-                         in_own_core)
+                         others)
         self.parts = [Problem(record.part(rows), axis, baseline, used[rows], self.limit,
-                              in_own_core) for rows in slices]
+                              others) for rows in slices]
         self.time = np.concatenate([rows.start / self.rate + part.time
                                     for rows, part in zip(slices, self.parts)])
         self.used = np.concatenate([part.used for part in self.parts])
@@ -125,9 +126,9 @@ class Stretches(Problem):
         """As `Problem.own_motions`, with columns of its own for each stretch."""
         return ShortColumns.in_turn([part.own_motions(effect) for part in self.parts])
 
-    def response(self, axis):
+    def response(self, axis, links=()):
         """As `Problem.response`, stretch by stretch."""
-        return np.concatenate([part.response(axis) for part in self.parts])
+        return np.concatenate([part.response(axis, links) for part in self.parts])
 
     def errors(self, fitted):
         """As `Problem.errors`, of the whole record, with what no fit has seen."""
@@ -138,7 +139,7 @@ class Stretches(Problem):
             is_last = len(record) - start < 2 * _LENGTH
             rows = slice(start, len(record) if is_last else start + _LENGTH)
             part = Problem(record.part(rows), self.axis, self.baseline, used[rows], self.limit,
-                           self.in_own_core)
+                           self.others)
             if part.used.any():
                 found[rows] = part.errors(part.fit(fitted.effects, iterations=0))
             if rows.stop == len(record):
