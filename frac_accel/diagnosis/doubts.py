@@ -12,6 +12,7 @@ from ..model.effects.base import CROSS_AXIS, OFFSET, Effect
 from .courses import with_level
 from .engine import LONG, WEIGHS
 from .gradual import gradual
+from .in_bands import otherwise_in_bands
 from .names import cancelling, undetermined
 from .problem import Problem, acts_on_spring
 from .search import acts_as_filter
@@ -115,7 +116,8 @@ def doubts_about(engine, best, gains, stds, left, noise):
         there = float(np.sqrt(np.mean(added[cause][engine.held_out_rows]**2)))
         # of the whole record: what was learnt may go astray where it is held out
         gained = min(takes[cause], engine.takes(best, cause))
-        if max(rms, there) < _BY_ITSELF * gained:
+        # what is added behind all dynamics sets nothing in motion
+        if max(rms, there) < _BY_ITSELF * gained and best.effects[cause].stage < OFFSET:
             doubts.setdefault(cause, f"it changes the output by {there:.3g} RMS only: the rest of "
                                      f"what it explains ({gained:.3g} RMS) is a free motion "
                                      "of its own")
@@ -142,6 +144,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **_acausal(engine, best, stds), **_of_the_model(engine, best),
                          **_as_slow(engine, best, added, takes),
                          **with_level(engine, best, added),
+                         **otherwise_in_bands(engine, best, added),
                          **gradual(engine, best, gains)}.items():
         doubts.setdefault(cause, words)
     for pair in cancelling(added):

@@ -311,13 +311,19 @@ class Engine:
         if self.comparing(cause) is not self:
             return self.part.rivals(self.part.best, cause)
         variance = best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
-        own = self._evidence(best, variance)
-        found = [(self._evidence(fit, variance) - own, fit.causes) for fit in
+        found = [(self._margin(fit, best, variance), fit.causes) for fit in
                  self.search.fits.values()
                  if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
         # a hollow one that is close says the same in other words
         return [entry for entry in sorted(found, key=lambda entry: entry[0])
                 if entry[0] > _CLOSE or not self.hollow(self.search.fits[entry[1]])]
+
+    def _margin(self, rival, best, variance):
+        """Variances of the noise by which a set is ahead of its rival; no lead of a rival that has
+        only come from a choice among more kinds of a cause."""
+        margin = self._evidence(rival, variance) - self._evidence(best, variance)
+        return margin if margin >= 0 else min(
+            self.score(rival, variance) - self.score(best, variance), 0.0)
 
     def comparing(self, cause):
         """The engine in which a cause has met its rivals: that of a long record's part, or this."""

@@ -52,10 +52,13 @@ class SamplingJitter(Effect):
         rate, used = seen.record.sampling_rate_hz, seen.used
         error = (seen.measured - seen.output)[used]
         slope = slope_of(seen.output)
-        measures = {"slope": slope, "level": seen.output - seen.output[used].mean(),
-                    "bend": np.gradient(np.gradient(seen.output))}
-        squares = {name: oaconvolve(np.square(values), around**2, "same")[used]
-                   for name, values in measures.items()}
+        bend = slope_of(slope)
+        level = seen.output - seen.output[used].mean()
+
+        def of_errors(power):
+            return oaconvolve(power, around**2, "same")[used]
+        squares = {"slope": of_errors(slope**2), "level": of_errors(level**2),
+                   "bend": of_errors(bend**2)}
         fits = {name: variance_law(error, square) for name, square in squares.items()}
         noise, factor, std = fits["slope"]
         if seen.is_coarse:
@@ -67,8 +70,9 @@ class SamplingJitter(Effect):
                 own - likelihood(error, fits[name][0] + fits[name][1] * squares[name]) < _BETTER
                 for name in ("level", "bend")):
             return None
-        # to second order: a normal shift's square has three times its variance's square on average
-        both = squares["slope"] + 0.75 * factor * squares["bend"]
+        # of the next order: a normal shift to the power of four is three times its variance's
+        # square on average
+        both = squares["slope"] + factor * of_errors(0.75 * bend**2 + slope * slope_of(bend))
         noise, factor, std = variance_law(error, both)
         power = noise + factor * both
         if not all(follows(error, power, squares[name]) for name in ("slope", "level")):
