@@ -32,7 +32,7 @@ from .flat import flat_instead, with_rival
 from .judgement import judge
 from .leftover import related
 from .off_clock import are_lost, clock_of, put_back, slips_of
-from .other_axes import OtherAxes, may_be_alike
+from .other_axes import OtherAxes, may_be_unlike
 from .read_off import drowned
 from .screened import screened
 from .search import is_nonlinear
@@ -166,7 +166,8 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
             stages=stages, step=found.step, limit=limit,
             passed_on=None if noise and noise.bends else noise, loose=loose,
             others=OtherAxes(tuple(cause for cause, entry in loose.items()
-                                   if seed is not None and entry.effect.restates_core)))
+                                   if seed is not None and entry.effect.restates_core),
+                             alike=bool(np.ptp(record.reference, axis=0).astype(bool).sum() > 1)))
 
     def ready(model, stds, seed):
         begin = engine_of(model, stds, seed)
@@ -191,7 +192,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     begin, engine, best = _searched(begin, engine, seed)
     if not is_stated and may_hide_one(engine, best):
         begin, engine, best, seed = _with_a_spring(begin, engine, best, seed, engine_of, record)
-    begin, engine, best = _with_like_axes(begin, engine, best, seed)
+    begin, engine, best = _with_unlike_axes(begin, engine, best, seed)
     begin, engine, best = _with_a_course(begin, engine, best, seed)
     if engine.part is None:
         engine, best = _without_start(begin, engine, best, found)
@@ -388,19 +389,19 @@ def _on_its_clock(begin, engine, own, ready, identified_without):
     return begin, engine, own
 
 
-def _with_like_axes(begin, engine, best, seed):
-    """Engine for which all axes have the same mount, dynamics and filters, what begins it, and its
-    best set; those given where what comes across does not show that."""
+def _with_unlike_axes(begin, engine, best, seed):
+    """Engine for which the other axes have filters and dynamics of their own, what begins it, and
+    its best set; those given, of axes that are alike, where that is clearly worse."""
     p = engine.problem
-    if not may_be_alike(engine, best) or p.limit.ends_search(
-            "whether all axes have the same filters was not tried"):
+    if not may_be_unlike(engine, best) or p.limit.ends_search(
+            "whether the other axes have other filters was not tried"):
         return begin, engine, best
-    own_begin = functools.partial(begin, others=dataclasses.replace(p.others, alike=True))
+    own_begin = functools.partial(begin, others=dataclasses.replace(p.others, alike=False))
     other = _beside(own_begin, engine, np.zeros(len(engine.wanted), bool))
     own_best = other.run(seed)
-    if best.cost - own_best.cost > (engine.part or engine).threshold(own_best):
-        return own_begin, other, own_best
-    return begin, engine, best
+    if own_best.cost - best.cost > (engine.part or engine).threshold(best):
+        return begin, engine, best
+    return own_begin, other, own_best
 
 
 def _with_a_course(begin, engine, best, seed):

@@ -193,7 +193,8 @@ def _beside_a_strong_force(engine, best, takes, left, noise):
 
 def _as_slow(engine, best, added, takes):
     """Slow causes beside which what is left wanders nearly as much: noise with a long memory; and
-    any beside a high-pass of the reference that is turned back, which gives its noise one."""
+    any but what goes with other axes beside a high-pass of the reference that is turned back, which
+    gives its noise one."""
     p, found = engine.problem, {}
     turned_back = [cause for cause, effect in best.effects.items() if np.any(effect.poles() == 0)]
 
@@ -206,7 +207,7 @@ def _as_slow(engine, best, added, takes):
         if takes[cause] < _SLOW_TIMES * wanders:
             found[cause] = f"what it explains is slow ({takes[cause]:.3g} RMS), and what is left " \
                            f"wanders by {wanders:.3g} RMS"
-        elif turned_back:
+        elif turned_back and best.effects[cause].stage != CROSS_AXIS:
             found[cause] = f"what it explains is slow ({takes[cause]:.3g} RMS), as the " \
                            f"reference's own noise is where {turned_back[0]} is turned back"
     return found

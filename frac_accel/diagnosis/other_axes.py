@@ -2,8 +2,6 @@
 
 import dataclasses
 
-import numpy as np
-
 from ..model import is_link
 from ..model.effects.base import CROSS_AXIS
 
@@ -20,8 +18,7 @@ class OtherAxes:
     in_own_core : tuple of str
         Causes that say what a core is that nobody has stated: it is that of all axes.
     alike : bool
-        Whether all axes have the same mount, dynamics and filters, as those of one housing do. What
-        comes across shows whether they do.
+        Whether all axes have the same mount, dynamics and filters, as those of one housing do.
     """
 
     in_own_core: tuple = ()
@@ -29,8 +26,13 @@ class OtherAxes:
 
     def have(self, effect):
         """Whether the other axes have an effect too."""
-        return effect.common_to_axes or effect.cause in self.in_own_core \
+        return effect.common_to_axes or effect.of_reference or effect.cause in self.in_own_core \
             or (self.alike and is_of_all_if_alike(effect))
+
+    def shown_by(self, effects):
+        """The same as far as a set of effects (by cause) shows it: by what comes across."""
+        crosses = any(effect.stage == CROSS_AXIS for effect in effects.values())
+        return dataclasses.replace(self, alike=self.alike and crosses)
 
     def said(self, finding):
         """A finding with words where it is written for all axes."""
@@ -47,20 +49,27 @@ UNLIKE = OtherAxes()
 
 def is_of_all_if_alike(effect):
     """Whether an effect is one of mount, dynamics or filters, and acts on what comes across."""
-    return effect.stage < CROSS_AXIS and not effect.of_reference and (
+    return acts_before(effect) and not effect.of_reference
+
+
+def acts_before(effect):
+    """Whether an effect changes dynamics before axes are mixed."""
+    return effect.stage < CROSS_AXIS and (
         effect.restates_core or (is_link(effect) and not effect.is_constant))
 
 
-def may_be_alike(engine, best):
-    """Whether something comes across beside a set of causes that leaves more than noise, or that
-    has filters of one axis alone."""
+def may_be_unlike(engine, best):
+    """Whether a set of causes of axes that are alike may be another one where they are not: with
+    something across, it leaves more than noise, or leaves as little without their filters."""
     p, fitted = engine.problem, (engine.part or engine)
-    if not any(np.ptp(p.record.reference[:, axis]) for axis in range(3) if axis != p.axis):
+    if not p.others.alike:
         return False
     crosses = any(effect.stage == CROSS_AXIS for effect in best.effects.values())
-    own = any(is_of_all_if_alike(effect) and not p.others.have(effect)
-              for effect in best.effects.values())
-    if fitted.noise_only(best):
-        return crosses and own
-    shares = {part: share for share, part in fitted.structure(best)}
-    return crosses or shares.get("across", 0.0) > _FROM_ACROSS
+    if not fitted.noise_only(best):
+        shares = {part: share for share, part in fitted.structure(best)}
+        return crosses or shares.get("across", 0.0) > _FROM_ACROSS
+    if not crosses or not any(is_of_all_if_alike(effect) and effect.cause not in
+                              p.others.in_own_core for effect in best.effects.values()):
+        return False
+    unlike = fitted.problem.beside(dataclasses.replace(p.others, alike=False))
+    return unlike.fit(best.effects).cost - best.cost < fitted.threshold(best)

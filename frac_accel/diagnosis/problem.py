@@ -17,7 +17,7 @@ from ..signals.kept import kept
 from ..simulation import EDGE, AxisSimulator
 from ..simulation.free_motion import fading, free_motions
 from .in_band import InBand
-from .other_axes import UNLIKE, is_of_all_if_alike
+from .other_axes import UNLIKE, acts_before
 from .short_columns import ShortColumns
 from .time_limit import TimeLimit
 
@@ -301,7 +301,7 @@ class Problem:
                         added, self.simulator(self.axis).circumstances)
             return added
         before = {**linear, cause: effects[cause]} if cause in effects else linear
-        across = effect.stage == CROSS_AXIS or (self.others.alike and is_of_all_if_alike(effect))
+        across = effect.stage == CROSS_AXIS or (is_link(effect) and self.others.have(effect))
         # where all of a path is new, few steps show as much as a first order is worth
         few = cause not in effects and follows_path(effect)
         return self.simulate({**linear, cause: effect}, across,
@@ -409,6 +409,13 @@ class Problem:
         part = object.__new__(type(self))
         part.__dict__.update(self.__dict__, used=used, _columns={})
         return part
+
+    def beside(self, others):
+        """The same problem beside other axes of which something else is known."""
+        other = self.restricted(self.used)
+        other.others = others
+        other.let_go()
+        return other
 
     def fit(self, effects, iterations=_ITERATIONS, rough=False, hopeless=np.inf, goal=np.inf,
             held=()):
@@ -699,7 +706,7 @@ class Problem:
         axis i, NaN where either does not move; and the standard uncertainties as for white noise.
         """
         links = tuple(effect for effect in self.of_all_axes(effects).values()
-                      if is_of_all_if_alike(effect))
+                      if acts_before(effect))
         return kept(self._mixings, links, self._mixing, links, most=2)
 
     def _mixing(self, links):

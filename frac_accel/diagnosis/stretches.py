@@ -195,6 +195,12 @@ class Stretches(Problem):
         fewer.parts = [part.restricted(rows) for part, rows in zip(self.parts, self._split(used))]
         return fewer
 
+    def beside(self, others):
+        """As `Problem.beside`."""
+        other = super().beside(others)
+        other.parts = [part.beside(others) for part in self.parts]
+        return other
+
     def mirrored(self):
         """As `Problem.mirrored`."""
         turned = super().restricted(self.used)

@@ -215,7 +215,8 @@ def _told(engine, likely, named, described, found):
     at_limit = engine.at_limit if any(f.effect.read_off for f in findings) else None
     rest = engine.budget(fitted, at_limit) if output is None else \
         engine.budget_between(p.measured, output, p.record.valid)
-    findings = [_beside_unseen_core(p.others.said(f), delay_of_unseen_core(engine, fitted))
+    others = p.others.shown_by(effects)
+    findings = [_beside_unseen_core(others.said(f), delay_of_unseen_core(engine, fitted))
                 for f in findings]
     more = [*engine.words_of_budget, *(noise.words if noise.rms is None else ())]
     found.words.extend(words for words in more if words not in found.words)
@@ -448,7 +449,8 @@ def _extended(engine, effects, stated):
     """The model in use with these causes on the diagnosed axis, and what is stated of it."""
     p = engine.problem
     own = p.axis_model(effects)
-    common = p.of_all_axes(effects)
+    others = p.others.shown_by(effects)
+    common = {cause: effect for cause, effect in effects.items() if others.have(effect)}
     axes = {name: p.axis_model(common, i) for i, name in enumerate(AXES)}
     axes[AXES[p.axis]] = own
     axes = {name: AxisModel(axis.core, tuple(e for e in axis.effects if not e.of_reference))

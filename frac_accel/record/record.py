@@ -125,9 +125,9 @@ class Record:
             since_start_s=self.since_start_s + rows.start / self.sampling_rate_hz)
 
     def comparable(self, column, used):
-        """The same with nothing on an axis that one of the two cannot show (`band_hz`).
+        """The same with nothing that one of the two cannot show (`band_hz`).
 
-        `used` (n,) are the samples that count; others are bridged.
+        `used` (n,) are the samples that count on an axis, `column`; others are bridged.
         """
         if self.band_hz is None or not used.any():
             return self
@@ -135,13 +135,17 @@ class Record:
         unknown[1] = unknown[1] | (self.valid & ~used)
         signals = self.reference.copy(), self.sensor.copy()
         # copies, since the signals are filtered in place
-        guesses = [guessed(values[:, column].copy(), other[:, column], which)
-                   for values, other, which in zip(signals, signals[::-1], unknown)]
-        for values, guess, which in zip(signals, guesses, unknown):
-            values[:, column] = within(guess, self.sampling_rate_hz, self.band_hz, which)
+        guesses = {axis: [guessed(values[:, axis].copy(), other[:, axis], which)
+                          for values, other, which in zip(signals, signals[::-1], unknown)]
+                   for axis in range(3)}
+        for axis, own in guesses.items():
+            for values, guess, which in zip(signals, own, unknown):
+                # what stands still does so beyond any filter
+                if np.ptp(guess):
+                    values[:, axis] = within(guess, self.sampling_rate_hz, self.band_hz, which)
         # beside a slower reference as filtered: the rest of that is its noise, which a law lets
         # through, and against which a search tries filters (four times as long, the same answer)
-        whole = signals[0][:, column] if "sensor" in self.resampled else guesses[0]
+        whole = signals[0][:, column] if "sensor" in self.resampled else guesses[column][0]
         return dataclasses.replace(self, reference=signals[0], sensor=signals[1], unfiltered=whole)
 
     def instants_of(self, which, column):

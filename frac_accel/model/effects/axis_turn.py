@@ -17,7 +17,8 @@ def turn_of(view):
 
     The shares of the axes in each other (`View.mixing`) are compared with the nearest rotation
     (P. H. Schoenemann, *Psychometrika* 31 (1966) 1-10). Where only one axis was measured, small
-    shares of the others are no turn: they may as well be its cross-axis sensitivity.
+    shares of the others are no turn, as they may as well be its cross-axis sensitivity; unless its
+    own share has lost just what a turn takes from it.
     """
     if view.mixing is None:
         return None
@@ -42,11 +43,19 @@ def turn_of(view):
             return None
         turned[np.ix_(moving, moving)] = nearest
     else:
-        row = np.nan_to_num(shares[own])
-        if np.linalg.norm(row) == 0 or row[own] > _FAR * np.linalg.norm(row):
+        row, std = np.nan_to_num(shares[own]), np.nan_to_num(stds[own])
+        length = np.linalg.norm(row)
+        if length == 0 or (row[own] > _FAR * length and not _keeps_length(row, std, own)):
             return None
         turned = _shortest_turn(own, row / np.linalg.norm(row))
     return _angles(turned.T)
+
+
+def _keeps_length(row, std, own):
+    """Whether an axis' own share is less than one by as much as a turn makes it."""
+    length = np.linalg.norm(row)
+    return abs(length - 1) < _WITHIN * np.linalg.norm(row * std) / length \
+        and 1 - row[own] > _SURE * std[own]
 
 
 def _shortest_turn(axis, row):
