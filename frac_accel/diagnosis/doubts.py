@@ -35,6 +35,8 @@ _MOST_OF = 0.5
 # one imitates another to a per cent. Several filters may in any case. Likewise what changes with
 # time.
 _RESEMBLES, _IMITATES, _MOSTLY = 30.0, 100.0, 0.5
+# Times what is left (RMS) that every set without a cause must leave for it to be like no other.
+_FAR_BEHIND = 5.0
 # Share of what is left that its linear part surely must have to count.
 _SURELY = 0.03
 # The same of what brings in the other axes: these have causes of their own, too.
@@ -226,7 +228,7 @@ def by_what_is_left(engine, fitted, takes, left):
     """
     return {**_other_laws(engine, fitted, takes, left), **_elsewhen(engine, fitted, takes, left),
             **_imitators(engine, fitted, takes, left), **_at_standstill(engine, fitted, takes),
-            **_on_both_sides(engine, fitted),
+            **_on_both_sides(engine, fitted, takes),
             **_one_filter(engine, fitted), **_another_alone(engine, fitted),
             **_other_axes(engine, fitted, takes, left)}
 
@@ -285,7 +287,7 @@ def _imitators(engine, best, takes, left):
     main = [cause for cause in odd if takes.get(cause, np.inf) > _MENDS * most]
     clear = main if len(main) == 1 and most > rest * (
         clearly if more is _MOVING or filters[main[0]].everyday or share < _MOSTLY
-        else _IMITATES) else []
+        or _is_like_no_other(engine, best, main[0]) else _IMITATES) else []
     if clear == odd:
         return {}
     linear = [cause for cause, effect in best.effects.items()
@@ -293,6 +295,16 @@ def _imitators(engine, best, takes, left):
               and cause not in clear
               and not _stands_out_at_its_peak(engine, best, cause, takes[cause])]
     return dict.fromkeys(linear, more.format(share))
+
+
+def _is_like_no_other(engine, best, cause):
+    """Whether no set without a cause, and no larger, comes near what one with it leaves, but for
+    such as say the same, which a name must beat anyway."""
+    own = engine.comparing(cause)
+    costs = [fit.cost / best.cost for fit in own.search.fits.values()
+             if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
+    return own is engine and min((cost for cost in costs if cost > _AS_WELL), default=0.0) \
+        > _FAR_BEHIND**2
 
 
 def _at_standstill(engine, best, takes):
@@ -613,9 +625,9 @@ def _damping(effect):
     return float(np.max(ratios, initial=0.0))
 
 
-def _on_both_sides(engine, best):
+def _on_both_sides(engine, best, takes):
     """Filters of the sensor and of the reference that undo each other at an end of the band, or
-    where the motion ends."""
+    where the motion ends; of which one that takes ten times the other may be there without it."""
     p, found = engine.problem, {}
     links = {cause: effect for cause, effect in _filters(engine, best).items()
              if is_link(effect) and _is_smooth(effect)}
@@ -631,7 +643,8 @@ def _on_both_sides(engine, best):
                     (size * back < 0) & (np.minimum(np.abs(size), np.abs(back)) > _UNDONE)):
                 words = (f"{cause} and {other} undo each other in part: one filter of the sensor "
                          "alone, with a zero for the reference's pole, does the same")
-                found |= {cause: words, other: words}
+                found |= {mine: words for mine, its in ((cause, other), (other, cause))
+                          if _MENDS * takes.get(mine, 0.0) < takes.get(its, np.inf)}
     return found
 
 
