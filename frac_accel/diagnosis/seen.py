@@ -77,15 +77,22 @@ class Seen:
     @functools.cached_property
     def of_one_error(self):
         """What comparing the two makes of an error of 1 in one of the sensor's samples, around it,
-        shape (2 k + 1,); None where it is no sample of its own."""
-        if "sensor" in self.record.resampled:
-            return None
-        if self.record.band_hz is None:
-            return np.ones(1)
-        return inner_taps(self.record.sampling_rate_hz, self.record.band_hz, len(self.output))
+        shape (2 k + 1,), at the record's instants; None where the sensor has none of its own.
+
+        Of a sensor with more samples than there are instants, each has less to say.
+        """
+        record = self.record
+        if record.band_hz is None:
+            return None if "sensor" in record.resampled else np.ones(1)
+        taps = inner_taps(record.sampling_rate_hz, record.band_hz, len(self.output))
+        if "sensor" not in record.resampled:
+            return taps
+        clock = record.topics[1].clock
+        return None if clock.kind == "uneven" else taps / np.sqrt(
+            max(clock.rate_hz / record.sampling_rate_hz, 1.0))
 
     def slope_beyond(self, noise):
-        """Power of the sensor's slope [output units a sample] beyond the band that is compared.
+        """Power of the sensor's slope [output units an instant] beyond the band that is compared.
 
         `noise` is the power that errors have within the band, and as densely beyond it.
         """
@@ -93,7 +100,8 @@ class Seen:
         if record.band_hz is None:
             return 0.0
         values = filled(topic.clock.slot, topic.values)[0][:, self.axis]
-        turns, density = periodogram(values, window="hann")
+        turns, density = periodogram(values, topic.clock.rate_hz / record.sampling_rate_hz,
+                                     window="hann")
         band = record.band_hz / record.sampling_rate_hz
         moving = np.maximum(density - noise / band, 0.0)[turns > band]
         return float(np.sum((2 * np.pi * turns[turns > band])**2 * moving) * turns[1])

@@ -29,3 +29,29 @@ def test_instants_scatter_by_a_tenth_of_the_interval(count, seed):
     named, = found.findings
     assert named.effect.rms_s == pytest.approx(scatter / RATE, rel=0.03)
     assert found.verdict == "explained"
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_instants_of_a_faster_sensor_scatter(seed):
+    """Each of its samples has less to say than one of as many as there are instants; it was said
+    that none of them could be told."""
+    rng = np.random.default_rng([92, seed])
+    fine, count = 4000.0, 24_000
+    motion = sosfiltfilt(butter(2, (0.5, 20.0), "band", fs=fine, output="sos"),
+                         rng.normal(size=20 * count + 80_000))[40_000:-40_000]
+    motion *= (1 + 0.4 * np.sin(2 * np.pi * np.arange(len(motion)) / len(motion) * 7)) \
+        / motion.std()
+    scatter_s = rng.uniform(4e-4, 8e-4)
+    every = np.arange(0, len(motion), 20), np.arange(0, len(motion), 25)
+    stamps = [np.round(1e9 * taken / fine) for taken in every]
+    reference = Samples.of(stamps[1], np.outer(motion[every[1]], [1.0, 0, 0]))
+
+    def found(scatter_s):
+        taken = every[0] + scatter_s * fine * rng.normal(size=count)
+        values = np.interp(taken, np.arange(len(motion)), motion) + 0.01 * rng.normal(size=count)
+        return diagnose((reference, Samples.of(stamps[0], np.outer(values, [1.0, 0, 0]))),
+                        SensorModel(Gain(1.0)))
+    named, = found(scatter_s).findings
+    assert named.cause == "sampling_jitter"
+    assert named.effect.rms_s == pytest.approx(scatter_s, rel=0.05)
+    assert found(0.0).findings == []

@@ -8,8 +8,11 @@ _AXES = "xyz"
 # differs by as much as it would add.
 _SURE = 6.0
 _LIKE, _WITHIN = 0.2, 3.0
-# With one axis measured: own share, over that of all, above which nothing tells a turn.
+# With one axis measured: own share, over that of all, above which nothing tells a turn; but for
+# one that has lost as much as this by it, and kept the length of all shares: noise of the reference
+# makes a gain of less.
 _FAR = 0.85
+_LOST = 0.02
 
 
 def turn_of(view):
@@ -55,7 +58,7 @@ def _keeps_length(row, std, own):
     """Whether an axis' own share is less than one by as much as a turn makes it."""
     length = np.linalg.norm(row)
     return abs(length - 1) < _WITHIN * np.linalg.norm(row * std) / length \
-        and 1 - row[own] > _SURE * std[own]
+        and 1 - row[own] > max(_SURE * std[own], _LOST)
 
 
 def _shortest_turn(axis, row):
