@@ -31,6 +31,7 @@ def test_instants_scatter_by_a_tenth_of_the_interval(count, seed):
     assert found.verdict == "explained"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", range(2))
 def test_instants_of_a_faster_sensor_scatter(seed):
     """Each of its samples has less to say than one of as many as there are instants; it was said
