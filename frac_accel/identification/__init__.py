@@ -1,5 +1,6 @@
 """From measured pairs to a sensor model with standard uncertainties."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -119,7 +120,10 @@ def _require_loadable(model):
     try:
         SensorModel.from_dict(model.to_dict())
     except ModelError as error:
-        raise IdentificationError(f"what fits best is no sensor: {error}; are the stamps right?") \
+        # a place in a file is no user's word here
+        words = re.sub(r"^effects\[(\d+)\]\.",
+                       lambda found: f"{model.effects[int(found[1])].cause}, ", str(error))
+        raise IdentificationError(f"what fits best is no sensor: {words}; are the stamps right?") \
             from None
 
 

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 import rig
+from scipy.signal import butter, sosfiltfilt
 
 from frac_accel import SensorModel, identify
 from frac_accel.cli import main
@@ -208,3 +209,13 @@ def test_command_of_two_bags(tmp_path, capsys):
 def test_no_record_is_refused():
     with pytest.raises(IdentificationError, match="no record given"):
         identify([])
+
+
+def test_a_delay_that_no_model_holds_is_refused_in_words_of_its_own():
+    rng = np.random.default_rng(5)
+    motion = sosfiltfilt(butter(2, 0.2, output="sos"), rng.normal(size=3012))
+    stamps = np.round(1e9 * 2 * np.arange(3000))
+    pair = tuple(Samples.of(stamps, np.outer(values, [1.0, 0, 0]))
+                 for values in (motion[12:], motion[6:-6] + 0.01 * rng.normal(size=3000)))
+    with pytest.raises(IdentificationError, match="no sensor: time_delay, delay_s: 12.* given"):
+        identify(pair)

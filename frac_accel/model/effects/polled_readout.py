@@ -58,8 +58,10 @@ class PolledReadout(Effect):
     @classmethod
     def recognised(cls, seen, shown):
         """The residual follows the slope by a lag that is a sawtooth of time."""
-        if seen.found.jitter_rms_s or seen.record.resampled or seen.is_coarse:
-            return None  # values between samples have no age; rounding of steady motion beats, too
+        # values between samples have no age; rounding of steady motion beats, too
+        if seen.found.jitter_rms_s or seen.is_coarse or any(
+                map(seen.record.is_on_other_instants, ("reference", "sensor"))):
+            return None
         error = seen.measured - seen.output
         beat = Beat.of(seen.measured, seen.output, seen.used)
         if beat is None:
