@@ -1,6 +1,7 @@
 """The clock behind stamps: rate, whole instants, and how far the stamps scatter about it."""
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,8 +59,26 @@ _ROUNDS = 8
 _LATE = 3.0
 # Percentile of the steps between uneven stamps that sets the rate that they can show.
 _LONG_STEP = 95
+# Samples on each side of a jump of the stamps, and the share of the power of their scatter that it
+# must make.
+_ON_EACH_SIDE, _ONE_JUMP = 16, 0.99
 # What a robust deviation is multiplied by to be a standard deviation of normal scatter.
 _NORMAL = 1.4826
+
+
+class Jump(NamedTuple):
+    """Stamps that jump by less than a sampling interval while the samples go on evenly.
+
+    Attributes
+    ----------
+    at_s : float
+        The first stamp behind it, after the record's first [s].
+    size_s : float
+        What is added to the stamps from there on [s].
+    """
+
+    at_s: float
+    size_s: float
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -79,6 +98,8 @@ class Clock:
         Whole instants, ascending; empty where there are none.
     scatter_s : float
         Standard deviation of the stamps about the line [s]; 0 of uneven ones.
+    jump : Jump or None
+        Where they jump once against the instants.
     """
 
     kind: str
@@ -86,6 +107,7 @@ class Clock:
     start_s: float
     slot: np.ndarray
     scatter_s: float
+    jump: Jump | None = None
 
     @classmethod
     def of(cls, stamps_ns):
@@ -116,7 +138,14 @@ class Clock:
                        np.empty(0), 0.0)
         slope, start = _line(slot, seconds)
         scatter = float(np.std(seconds - (slope * slot + start)))
-        return cls("regular", rate, float(np.median(place)) / rate, slot, scatter)
+        jump = _set_once(slot, seconds)
+        if jump is None:
+            return cls("regular", rate, float(np.median(place)) / rate, slot, scatter)
+        # the samples go on evenly
+        before = seconds - jump.size_s * (seconds >= jump.at_s)
+        slope, start = _line(slot, before)
+        scatter = float(np.std(before - (slope * slot + start)))
+        return cls("regular", float(1 / slope), float(start), slot, scatter, jump)
 
     def instants_s(self, stamps_ns):
         """Instants [s] of the samples with these stamps, after the first of them."""
@@ -326,6 +355,31 @@ def _grown(seconds, slots):
         place = (seconds[:length] - line[1]) / line[0]
         line = _line(np.round(place), seconds[:length])
     return line
+
+
+def _set_once(slot, seconds):
+    """`Jump` of stamps that scatter little but for it, or None.
+
+    Of all instants, the one at which a step beside a line leaves least of the stamps; from their
+    sums, since a fit for each would take for ever.
+    """
+    count = len(slot)
+    slope, start = _line(slot, seconds)
+    late = seconds - (slope * slot + start)
+    away = slot - slot.mean()
+    # of each sample, what lies from it on
+    number = np.arange(count, 0, -1.0)
+    sums, places = np.cumsum(late[::-1])[::-1], np.cumsum(away[::-1])[::-1]
+    power = number - number**2 / count - places**2 / (away @ away)
+    inner = slice(_ON_EACH_SIDE, count - _ON_EACH_SIDE)
+    if count <= 3 * _ON_EACH_SIDE:
+        return None
+    taken = np.where(power > 0, sums**2 / np.maximum(power, 1e-300), 0.0)[inner]
+    at = _ON_EACH_SIDE + int(np.argmax(taken))
+    if taken.max() < _ONE_JUMP * (late @ late) or np.std(late) < _REGULAR * slope \
+            or slot[at] - slot[at - 1] != 1:
+        return None
+    return Jump(float(seconds[at]), float(sums[at] / power[at]))
 
 
 def _line(place, values):

@@ -230,6 +230,10 @@ class Topic:
         elif clock.kind == "batches":
             words.append(f"the samples come in batches: their instants are taken as uniform at "
                          f"{clock.rate_hz:.6g} Hz")
+        if clock.jump:
+            words.append(f"{clock.jump.at_s:.6g} s after the start the stamps jump by "
+                         f"{1e3 * clock.jump.size_s:.4g} ms while the samples go on evenly: "
+                         "their clock was set")
         if jitter:
             words.append(f"the stamps scatter by {jitter:.3g} s (RMS), "
                          f"{jitter * clock.rate_hz:.2%} of the sampling interval")

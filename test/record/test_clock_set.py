@@ -1,0 +1,62 @@
+"""Stamps that jump once by less than an interval, as where a clock is set; the samples go on."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
+
+from frac_accel import Samples, SensorModel, diagnose
+from frac_accel.model.core import Gain
+from frac_accel.record.clock import Clock
+
+RATE, COUNT = 200.0, 12_000
+
+
+def stamped(rng, scatter):
+    """Stamps [ns], the sample at which they jump, and by how much [s]."""
+    at = rng.integers(COUNT // 5, 4 * COUNT // 5)
+    size = rng.uniform(0.1, 0.45) * rng.choice([-1, 1]) / RATE
+    seconds = np.arange(COUNT) / RATE + size * (np.arange(COUNT) >= at)
+    return np.round(1e9 * (seconds + scatter / RATE * rng.normal(size=COUNT))), at, size
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("scatter", [0.0, 0.002])
+def test_a_jump_is_told_and_instants_go_on(seed, scatter):
+    rng = np.random.default_rng([121, seed])
+    stamps, at, size = stamped(rng, scatter)
+    clock = Clock.of(stamps)
+    assert clock.jump.size_s == pytest.approx(size, abs=0.001 / RATE)
+    assert clock.jump.at_s == pytest.approx(at / RATE + size, abs=0.02 / RATE)
+    assert clock.rate_hz == pytest.approx(RATE, rel=1e-7)
+    np.testing.assert_allclose(clock.instants_s(stamps), np.arange(COUNT) / RATE,
+                               atol=0.01 / RATE)
+    assert clock.scatter_s < (scatter + 0.001) / RATE
+
+
+def test_scatter_losses_and_wander_are_no_jump():
+    rng, place = np.random.default_rng(122), np.arange(COUNT)
+    for seconds in (place / RATE, (place + 0.05 * rng.normal(size=COUNT)) / RATE,
+                    place[rng.random(COUNT) > 0.02] / RATE,
+                    (place + 0.2 * np.sin(2 * np.pi * place / COUNT)) / RATE,
+                    (place + 0.2 * np.abs(place / COUNT - 0.5)) / RATE):
+        assert Clock.of(np.round(1e9 * seconds)).jump is None
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_no_cause_is_invented_for_it(seed):
+    """It was `timestamp_jitter`, with a skew and a delay that undo each other."""
+    rng = np.random.default_rng([123, seed])
+    stamps, _, _ = stamped(rng, 0.0)
+    fine = np.arange(COUNT * 20 + 400) / (20 * RATE)
+    motion = sosfiltfilt(butter(3, (0.5, 20.0), "band", fs=20 * RATE, output="sos"),
+                         rng.normal(size=len(fine)))
+    motion = CubicSpline(fine, motion / motion.std())
+    taken = 0.02 + np.arange(COUNT) / RATE
+    every = 0.02 + np.arange(int(COUNT / 1.6)) * 1.6 / RATE
+    reference = Samples.of(np.round(1e9 * (every - 0.02)), np.outer(motion(every), [1.0, 0, 0]))
+    sensor = motion(taken) + 0.005 * rng.normal(size=COUNT)
+    found = diagnose((reference, Samples.of(stamps, np.outer(sensor, [1.0, 0, 0]))),
+                     SensorModel(Gain(1.0)))
+    assert found.findings == [] and found.verdict == "consistent"
+    assert any("their clock was set" in words for words in found.integrity.words)
