@@ -13,6 +13,7 @@ from ..identification.fit.uncertainty import by_blocks, sandwich
 from ..identification.response.excitation import STRETCHES, alternating_stretches, held_out, is_new
 from ..model import is_link
 from ..model.effects import effect_of
+from ..model.effects.base import CROSS_AXIS
 from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
@@ -77,6 +78,13 @@ def noise_peak(residual, used):
     power = np.abs(rfft(residual))**2
     smooth = uniform_filter1d(power, max(5, len(power) // 64), mode="reflect")
     return float(max(smooth.max() / smooth.mean(), 1.0))
+
+
+def _mixes_otherwise(fit, best):
+    """Whether two sets differ by what mixes the axes, and by nothing else."""
+    apart = [fits.effects[cause] for fits, other in ((fit, best), (best, fit))
+             for cause in fits.causes - other.causes]
+    return bool(apart) and all(effect.stage == CROSS_AXIS for effect in apart)
 
 
 class Engine:
@@ -225,9 +233,10 @@ class Engine:
                                     + [best.effects])
             variance = best.cost / self.problem.count \
                 * noise_peak(best.residual, self.problem.used)
-            for rival in [fit for fit in self.search.fits.values() if fit.causes != best.causes
-                          and abs(self.score(fit, variance) - self.score(best, variance)) < _SAME]:
-                # what says the same may do so with less beside it
+            for rival in [fit for fit in self.search.fits.values()
+                          if _mixes_otherwise(fit, best) and abs(
+                              self.score(fit, variance) - self.score(best, variance)) < _SAME]:
+                # what says the same may do so with less beside it: a turn takes from the gain
                 self.search.prune(rival, self.threshold)
             near = sorted((fit for fit in self.search.fits.values()
                            if len(fit.effects) <= len(best.effects)
