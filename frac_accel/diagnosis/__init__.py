@@ -167,7 +167,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
             passed_on=None if noise and noise.bends else noise, loose=loose,
             others=OtherAxes(tuple(cause for cause, entry in loose.items()
                                    if seed is not None and entry.effect.restates_core),
-                             alike=bool(np.ptp(record.reference, axis=0).astype(bool).sum() > 1)))
+                             alike=np.count_nonzero(np.ptp(record.reference, axis=0)) > 1))
 
     def ready(model, stds, seed):
         begin = engine_of(model, stds, seed)

@@ -29,10 +29,13 @@ class OtherAxes:
         return effect.common_to_axes or effect.of_reference or effect.cause in self.in_own_core \
             or (self.alike and is_of_all_if_alike(effect))
 
+    def common(self, effects):
+        """Of these effects, by cause, what the other axes have too."""
+        return {cause: effect for cause, effect in effects.items() if self.have(effect)}
+
     def shown_by(self, effects):
         """The same as far as a set of effects (by cause) shows it: by what comes across."""
-        crosses = any(effect.stage == CROSS_AXIS for effect in effects.values())
-        return dataclasses.replace(self, alike=self.alike and crosses)
+        return dataclasses.replace(self, alike=self.alike and _crosses(effects))
 
     def said(self, finding):
         """A finding with words where it is written for all axes."""
@@ -45,6 +48,10 @@ class OtherAxes:
 
 # Nothing but what is common to all axes by its nature.
 UNLIKE = OtherAxes()
+
+
+def _crosses(effects):
+    return any(effect.stage == CROSS_AXIS for effect in effects.values())
 
 
 def is_of_all_if_alike(effect):
@@ -64,7 +71,7 @@ def may_be_unlike(engine, best):
     p, fitted = engine.problem, (engine.part or engine)
     if not p.others.alike:
         return False
-    crosses = any(effect.stage == CROSS_AXIS for effect in best.effects.values())
+    crosses = _crosses(best.effects)
     if not fitted.noise_only(best):
         shares = {part: share for share, part in fitted.structure(best)}
         return crosses or shares.get("across", 0.0) > _FROM_ACROSS

@@ -264,7 +264,7 @@ class Problem:
         These have the model in use, and of the causes only what is the same for all axes.
         """
         total = np.zeros(len(self.record))
-        common = self.of_all_axes(effects)
+        common = self.others.common(effects)
         for other, share in enumerate(shares):
             if other == self.axis or not share or not np.ptp(self.record.reference[:, other]):
                 continue
@@ -274,10 +274,6 @@ class Problem:
                 self._others, (other, before),
                 self.simulator(other, _STEPS_OF_SLOPES).simulate, AxisModel(model.core, before))
         return total
-
-    def of_all_axes(self, effects):
-        """Of these causes, by name, what the other axes have as well."""
-        return {cause: effect for cause, effect in effects.items() if self.others.have(effect)}
 
     def change(self, effects, cause, effect):
         """First-order change of the output, shape (n,), when a cause is added or changed.
@@ -705,7 +701,7 @@ class Problem:
         Matrix, shape (3, 3): row i has the shares of the axes' simulated outputs in the measured
         axis i, NaN where either does not move; and the standard uncertainties as for white noise.
         """
-        links = tuple(effect for effect in self.of_all_axes(effects).values()
+        links = tuple(effect for effect in self.others.common(effects).values()
                       if acts_before(effect))
         return kept(self._mixings, links, self._mixing, links, most=2)
 

@@ -449,8 +449,7 @@ def _extended(engine, effects, stated):
     """The model in use with these causes on the diagnosed axis, and what is stated of it."""
     p = engine.problem
     own = p.axis_model(effects)
-    others = p.others.shown_by(effects)
-    common = {cause: effect for cause, effect in effects.items() if others.have(effect)}
+    common = p.others.shown_by(effects).common(effects)
     axes = {name: p.axis_model(common, i) for i, name in enumerate(AXES)}
     axes[AXES[p.axis]] = own
     axes = {name: AxisModel(axis.core, tuple(e for e in axis.effects if not e.of_reference))

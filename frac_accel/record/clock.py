@@ -137,10 +137,10 @@ class Clock:
             return cls("uneven", float(1 / np.percentile(steps, _LONG_STEP)), 0.0,
                        np.empty(0), 0.0)
         slope, start = _line(slot, seconds)
-        scatter = float(np.std(seconds - (slope * slot + start)))
-        jump = _set_once(slot, seconds)
+        late = seconds - (slope * slot + start)
+        jump = _set_once(slot, seconds, late, slope)
         if jump is None:
-            return cls("regular", rate, float(np.median(place)) / rate, slot, scatter)
+            return cls("regular", rate, float(np.median(place)) / rate, slot, float(np.std(late)))
         # the samples go on evenly
         before = seconds - jump.size_s * (seconds >= jump.at_s)
         slope, start = _line(slot, before)
@@ -357,27 +357,24 @@ def _grown(seconds, slots):
     return line
 
 
-def _set_once(slot, seconds):
-    """`Jump` of stamps that scatter little but for it, or None.
+def _set_once(slot, seconds, late, interval):
+    """`Jump` of stamps that scatter little but for it, or None, from how `late` they are on a line.
 
     Of all instants, the one at which a step beside a line leaves least of the stamps; from their
     sums, since a fit for each would take for ever.
     """
     count = len(slot)
-    slope, start = _line(slot, seconds)
-    late = seconds - (slope * slot + start)
+    if count <= 3 * _ON_EACH_SIDE or np.std(late) < _REGULAR * interval:
+        return None
     away = slot - slot.mean()
     # of each sample, what lies from it on
     number = np.arange(count, 0, -1.0)
     sums, places = np.cumsum(late[::-1])[::-1], np.cumsum(away[::-1])[::-1]
     power = number - number**2 / count - places**2 / (away @ away)
     inner = slice(_ON_EACH_SIDE, count - _ON_EACH_SIDE)
-    if count <= 3 * _ON_EACH_SIDE:
-        return None
     taken = np.where(power > 0, sums**2 / np.maximum(power, 1e-300), 0.0)[inner]
     at = _ON_EACH_SIDE + int(np.argmax(taken))
-    if taken.max() < _ONE_JUMP * (late @ late) or np.std(late) < _REGULAR * slope \
-            or slot[at] - slot[at - 1] != 1:
+    if taken.max() < _ONE_JUMP * (late @ late) or slot[at] - slot[at - 1] != 1:
         return None
     return Jump(float(seconds[at]), float(sums[at] / power[at]))
 
