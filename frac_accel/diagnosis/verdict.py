@@ -380,13 +380,15 @@ def _by_curves(engine, fitted, after, parts, named):
 
 
 def _kept(engine, fitted, widest, after, output):
-    """Fit of a set with linear causes that are only suspected, where it predicts held-out data
+    """Fit of a set with causes that are only suspected, of linear ones and of such as change along
+    the record, where it predicts held-out data
     clearly better than all else that describes them, its standard uncertainties, its held-out error
     and its output; or None, nothing, and those given."""
     p, rest = engine.problem, engine.held_out_rows
     more = {cause: effect for cause, effect in widest.effects.items()
             if cause not in fitted.causes and (is_link(effect) or effect.pure_delay_s()
-                                               or effect.is_constant or effect.restates_core)}
+                                               or effect.is_constant or effect.restates_core
+                                               or effect.shows_with_time)}
     if not more or p.limit.ends_judging("what is only suspected was not kept as a description"):
         return None, {}, after, output
     slow = [effect for effect in {**more, **fitted.effects}.values() if effect.acts_on_slow_motion]
