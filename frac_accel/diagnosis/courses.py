@@ -33,6 +33,8 @@ _VARIES = 0.1
 _HELD = 1e-4
 # Shares of a heat, a charge or a level that stay from one instant of a course to the next.
 _KEEPS = (0.0, 0.5, 0.75, 0.9, 0.95)
+# Instants of a course at whose mean level that began; one alone would make a course by chance.
+_BEFORE = 4
 # Share of a level's mean below which its logarithm is not followed.
 _LEVEL_FLOOR = 1e-3
 # Share of what is left that may still change with time, in the part of the budget that is its own.
@@ -239,8 +241,9 @@ def _as_level(course, weight, motion, used, waves=None):
     found = 0.0
     for size in (abs(swing), abs(np.gradient(swing))):
         for level in (_mean(size, used), _mean(size**2, used)):
+            before = level[:_BEFORE].mean()
             for keeps in _KEEPS:
-                after = lfilter([1 - keeps], [1, -keeps], level, zi=[keeps * level[0]])[0]
+                after = lfilter([1 - keeps], [1, -keeps], level, zi=[keeps * before])[0]
                 if np.std(after) > _VARIES * np.mean(after):
                     found = max(found, *(_alike(course, weight, shown(each)) for each in (
                         after, np.sqrt(after), np.log(after + _LEVEL_FLOOR * after.mean()))))

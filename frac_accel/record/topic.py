@@ -15,6 +15,8 @@ from .lattice import lattice_step, stuck_bit
 _FEWEST = 32
 # Scatter of the stamps [sampling intervals] below which it counts as none.
 _JITTER = 2e-4
+# Times the scatter that rounding to the stamps' unit makes (its twelfth, squared), which it may be.
+_BY_ROUNDING = 1.1
 # A gap of both topics: half an interval at its ends, which may be jitter; samples that the other
 # one would have in it, at least, to tell; share of them that it may have. Share of the rate from
 # which a single sample tells.
@@ -40,6 +42,8 @@ class Integrity:
     lower, upper : float or None
         Limits at which samples pile up.
     words : list of str
+    rounds_stamps : bool
+        Whether they scatter by no more than their own rounding makes.
     reference_noise : budget.reference_noise.ReferenceNoise or None
         Of the other topic, where the two together show it.
     """
@@ -54,6 +58,7 @@ class Integrity:
     lower: float | None
     upper: float | None
     words: list
+    rounds_stamps: bool = False
     reference_noise: object = None
 
     @property
@@ -124,6 +129,12 @@ class Topic:
     def scatters(self):
         """Whether its stamps scatter about uniform instants by more than clocks do."""
         return self.clock.scatter_s * self.clock.rate_hz > _JITTER
+
+    @functools.cached_property
+    def rounded_to_s(self):
+        """Unit of the stamps [s] where their scatter is no more than rounding to it makes, or 0."""
+        unit = int(np.gcd.reduce(np.diff(self.stamps_ns))) * 1e-9
+        return unit if self.clock.scatter_s < _BY_ROUNDING * unit / np.sqrt(12) else 0.0
 
     def shift(self, seconds):
         """Move all stamps; what has been found of them holds as it is."""
@@ -210,7 +221,8 @@ class Topic:
         if not own_instants:
             step = None
         return Integrity(len(self), missing, self.duplicates,
-                         self.stamps_back, self.not_finite, jitter, step, lower, upper, words)
+                         self.stamps_back, self.not_finite, jitter, step, lower, upper, words,
+                         bool(jitter and self.rounded_to_s))
 
     def _stamp_words(self, jitter, missing):
         words, clock = [], self.clock
@@ -235,7 +247,8 @@ class Topic:
                          f"{1e3 * clock.jump.size_s:.4g} ms while the samples go on evenly: "
                          "their clock was set")
         if jitter:
-            words.append(f"the stamps scatter by {jitter:.3g} s (RMS), "
+            unit = f"are multiples of {self.rounded_to_s:.3g} s, and " if self.rounded_to_s else ""
+            words.append(f"the stamps {unit}scatter by {jitter:.3g} s (RMS), "
                          f"{jitter * clock.rate_hz:.2%} of the sampling interval")
         return words
 

@@ -160,6 +160,7 @@ def test_refusals(files, tmp_path, capsys, what, expected):
     assert expected.lower() in line.lower()
 
 
+@pytest.mark.thorough
 def test_without_temperature_it_says_what_cannot_be_found(files, tmp_path, capsys):
     source, model = changed(files, tmp_path)
     said = diagnose(tmp_path, source, model, "--temperature", "/cabin")
@@ -204,6 +205,7 @@ def holed(samples):
     return samples._replace(values=values)
 
 
+@pytest.mark.thorough
 def test_values_that_are_not_finite_are_left_out(files, tmp_path):
     said = diagnose(tmp_path, *changed(files, tmp_path, sensor=holed))
     assert any("300 samples with values that are not finite" in words

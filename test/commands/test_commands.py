@@ -219,6 +219,7 @@ def test_blocks_of_samples_are_corrected(tmp_path):
     assert np.max(np.abs(found.stamps_ns - expected.stamps_ns)) <= 1
 
 
+@pytest.mark.thorough
 def test_memory_does_not_grow_with_the_bag(tmp_path):
     raw = read_bag(bag(FRACTIONAL))[RAW_TOPIC]
     peaks = []

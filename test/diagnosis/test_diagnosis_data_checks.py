@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from frac_accel.io.samples import Samples
+from frac_accel.model.effects.timestamp_jitter import TimestampJitter
 from frac_accel.record import Record, Topic
 from frac_accel.record.clock import slots_of
 from frac_accel.record.lattice import lattice_step
@@ -61,6 +62,21 @@ def test_lost_samples_are_counted_and_stamps_that_scatter_measured(seed):
     found = Topic(samples(rng.normal(size=kept.sum()), stamps[kept]), "sensor").integrity(0)
     assert found.missing == np.sum(~kept)
     assert found.jitter_rms_s == pytest.approx(scatter_s, rel=0.05)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_stamps_that_are_rounded_scatter_for_no_other_reason(seed):
+    """1 µs at 2 kHz was `timestamp_jitter`."""
+    rng = np.random.default_rng([55, seed])
+    unit = rng.choice([1e-6, 1e-5, 1e-3]) * rng.choice([1, 2, 5])
+    rate, values = rng.uniform(0.005, 0.05) / unit, rng.normal(size=10_000)
+    true = np.arange(10_000) / rate
+    for scatter, rounds in ((0.0, True), (unit, False)):
+        stamps = unit * np.round((true + rng.normal(0, scatter, 10_000)) / unit)
+        found = Topic(samples(values, stamps), "sensor").integrity(0)
+        assert found.rounds_stamps == rounds
+        assert any("stamps are multiples of" in words for words in found.words) == rounds
+        assert (TimestampJitter.of_record(found, values) is None) == rounds
 
 
 @pytest.mark.parametrize("scatter", [0.15, 0.25, 0.35])

@@ -14,14 +14,18 @@ from frac_accel.model.core import Gain
 RATE, FINER, DURATION_S = 100.0, 4, 240.0
 
 
-def settling(seed):
-    """Reference and sensor with a zero that settles within a sixth of the record, on 0; its law."""
+def settling(seed, constant_s=(8.0, 20.0), quiet_s=0.0):
+    """Reference and sensor with a zero that settles within a sixth of the record, on 0; its law.
+
+    The motion may be less at the start, for so long.
+    """
     rng = np.random.default_rng(seed)
     fine = FINER * RATE
     motion = sosfiltfilt(butter(4, [0.3, 20.0], "band", fs=fine, output="sos"),
                          rng.normal(size=round(fine * DURATION_S)))
     motion /= motion.std()
-    size, constant_s = rng.choice([-1, 1]) * rng.uniform(0.1, 0.4), rng.uniform(8.0, 20.0)
+    motion[:round(fine * quiet_s)] *= 0.5
+    size, constant_s = rng.choice([-1, 1]) * rng.uniform(0.1, 0.4), rng.uniform(*constant_s)
     time = np.arange(len(motion)) / fine
     sensor = motion + size * np.exp(-time / constant_s)
     return sampled_pair(rng, (motion, sensor), FINER, RATE, 0.005), -size, constant_s
@@ -39,6 +43,14 @@ def test_a_zero_that_has_settled_is_named(seed):
     assert abs(settled.effect.size + size) < 4 * settled.std["size"]
     assert abs(settled.effect.time_constant_s - constant_s) < 4 * settled.std["time_constant_s"]
     assert found.extended["nrmse"] < 0.01
+
+
+@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.thorough)])
+def test_one_quiet_instant_at_the_start_makes_no_course_of_the_motions_level(seed):
+    """That warmed something up in just such a course, it was said: no name."""
+    record, size, constant_s = settling(seed, (60.0, 80.0), 2.5)
+    found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
+    assert {finding.cause for finding in found.findings} == {"warm_up_drift"}
 
 
 def test_what_was_open_and_gave_way_to_another_cause_has_not_moved():

@@ -82,6 +82,7 @@ def collected(*options):
     return [line for line in shown.stdout.splitlines() if "::" in line]
 
 
+@pytest.mark.thorough
 def test_colcon_test_is_given_the_fast_part_of_the_suite():
     fast = collected("-m", "fast")
     assert len(fast) > 500

@@ -75,7 +75,9 @@ def test_shocks_that_both_see_are_motion(seed):
     assert glitches(motion + 0.01 * rng.normal(size=COUNT), sensor, np.ones(COUNT, bool)) == []
 
 
-@pytest.mark.parametrize("kind", ["zeros", "hold", "noise"])
+@pytest.mark.parametrize("kind", [
+    "hold", pytest.param("zeros", marks=pytest.mark.thorough),
+    pytest.param("noise", marks=pytest.mark.thorough)])
 def test_a_faulty_reference_gives_the_sensor_no_name(kind):
     """Bursts of interference were named, or noise of the reference."""
     rng = np.random.default_rng([994, len(kind)])

@@ -25,7 +25,7 @@ class TimestampJitter(Effect):
 
     @classmethod
     def of_record(cls, found, measured):
-        return cls(found.jitter_rms_s) if found.jitter_rms_s else None
+        return cls(found.jitter_rms_s) if found.jitter_rms_s and not found.rounds_stamps else None
 
     def reading(self, seen):
         """Beside a simulation whose samples are taken at the stamps that they carry; None of
