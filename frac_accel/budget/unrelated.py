@@ -15,7 +15,7 @@ _WINDOW = 32
 _POWER = 9.0
 _STANDS_OUT = 6.0
 # Share of the samples that is no longer short, and samples that a level's scale is taken from.
-_SHORT = 0.1
+_SHORT = 0.25
 _LEVEL_SAMPLES = 50
 # Parts of the record in which the scale may differ.
 _PARTS = 20

@@ -269,7 +269,8 @@ def _alike(course, weight, measure):
 
 def with_level(engine, best, added):
     """Causes that change with time, or once, as the motion's level does, in words by cause: what
-    follows the motion and what follows time are the same there."""
+    follows the motion and what follows time are the same there, unless a law in time describes
+    the record clearly better."""
     p, found = engine.problem, {}
     for cause, change in added.items():
         effect = best.effects[cause]
@@ -284,7 +285,10 @@ def with_level(engine, best, added):
         if np.sum((change - told * column)[p.used]**2) > (1 - _SLOW) * np.sum(change[p.used]**2):
             continue
         alike = _as_level(course, weight, before, p.used)
-        if alike > _ALIKE:
+        whole = course + _mean(best.residual * column, p.used) / np.maximum(weight, 1e-300)
+        by_law, by_level = (1 - _alike(whole, weight, course),
+                            1 - _as_level(whole, weight, before, p.used))
+        if alike > _ALIKE and (cause in engine.search.courses or by_level < _CLEARLY * by_law):
             found[cause] = f"the motion's level changes in the same way (correlation " \
                            f"{np.sqrt(alike):.2f}): it may follow the motion, not time"
     return found

@@ -16,7 +16,7 @@ from .instants import put_on_instants
 from .ordering import in_order, late_words
 from .pairing import FEWEST, by_slots, by_stamps, same_clock, share_instants
 from .relation import clock_offset, refined
-from .resampling import filled, guessed, within
+from .resampling import filled, guessed, inner_filter
 from .temperature import Temperature
 from .topic import Topic
 
@@ -135,14 +135,15 @@ class Record:
         unknown[1] = unknown[1] | (self.valid & ~used)
         signals = self.reference.copy(), self.sensor.copy()
         # copies, since the signals are filtered in place
-        guesses = {axis: [guessed(values[:, axis].copy(), other[:, axis], which)
+        inside = inner_filter(self.sampling_rate_hz, self.band_hz, len(self))
+        guesses = {axis: [guessed(values[:, axis].copy(), other[:, axis], which, inside)
                           for values, other, which in zip(signals, signals[::-1], unknown)]
                    for axis in range(3)}
         for axis, own in guesses.items():
-            for values, guess, which in zip(signals, own, unknown):
+            for values, guess in zip(signals, own):
                 # what stands still does so beyond any filter
                 if np.ptp(guess):
-                    values[:, axis] = within(guess, self.sampling_rate_hz, self.band_hz, which)
+                    values[:, axis] = inside(guess)
         # beside a slower reference as filtered: the rest of that is its noise, which a law lets
         # through, and against which a search tries filters (four times as long, the same answer)
         whole = signals[0][:, column] if "sensor" in self.resampled else guesses[column][0]

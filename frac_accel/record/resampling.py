@@ -124,17 +124,21 @@ def within(values, rate_hz, band_hz, unknown):
     ndarray, shape (n,)
     """
     inside = inner_filter(rate_hz, band_hz, len(values))
-    return inside(_bridged(values, unknown, inside))
+    return inside(_bridged(values, unknown, _beyond(inside)))
 
 
-def guessed(values, other, unknown):
-    """Values of which some are unknown, these as a short filter of another signal has them that
-    fits the rest; on a straight line between their neighbours where the two share too little.
+def guessed(values, other, unknown, inside):
+    """Values of which some are unknown, these so that within a band they differ least from what a
+    short filter of another signal has there, which fits the rest.
+
+    Where the two share too little, so that least of the values is beyond the band.
 
     Parameters
     ----------
     values, other : ndarray, shape (n,)
     unknown : ndarray of bool, shape (n,)
+    inside : callable
+        The filter that keeps the band (`inner_filter`).
 
     Returns
     -------
@@ -144,32 +148,35 @@ def guessed(values, other, unknown):
     if not unknown.any() or unknown.all():
         return values
     place, known = np.arange(len(values)), np.flatnonzero(~unknown)
-    mean = values[known].mean()
-    moving, other = np.where(unknown, 0.0, values - mean), other - other.mean()
-    shared = np.abs(fftconvolve(moving, other[::-1]))
+    mean, other = values[known].mean(), other - other.mean()
+    values = np.interp(place, known, values[known])
+    moving, kept = inside(values) - mean, inside(other)
+    shared = np.abs(fftconvolve(np.where(unknown, 0.0, moving), kept[::-1]))
     lags = np.argmax(shared) - len(other) + 1 + np.arange(-_GUESSED_TAPS, _GUESSED_TAPS + 1)
-
-    def shifted(rows):
-        return np.take(other, rows[:, None] - lags, mode="clip")
     rows = known[::max(len(known) // _GUESSED_ROWS, 1)]
-    columns = shifted(rows)
+    columns = np.take(kept, rows[:, None] - lags, mode="clip")
     taps, *_ = np.linalg.lstsq(columns, moving[rows], rcond=1e-6)
-    result = np.interp(place, known, values[known])
-    if np.var(moving[rows] - columns @ taps) < _GUESSED_LEFT * np.var(moving[rows]):
-        result[unknown] = mean + shifted(place[unknown]) @ taps
-    return result
+    if not np.var(moving[rows] - columns @ taps) < _GUESSED_LEFT * np.var(moving[rows]):
+        return _bridged(values, unknown, _beyond(inside))
+    alike = mean + sum(tap * np.take(other, place - lag, mode="clip")
+                       for tap, lag in zip(taps, lags))
+    return alike + _bridged(np.where(unknown, 0.0, values - alike), unknown, inside)
 
 
-def _bridged(values, missing, inside):
-    """Values, where some are missing changed so that least of all is beyond the band.
+def _beyond(inside):
+    """What a filter takes away."""
+    return lambda values: values - inside(values)
+
+
+def _bridged(values, missing, part):
+    """Values, where some are missing changed so that least of all is in a part of the band.
 
     Least squares by conjugate gradients, of which there are few, as long gaps are not determined
     (after A. Papoulis, *IEEE Trans. Circuits Syst.* 22 (1975) 735-742).
     """
-    def beyond(values):
-        once = values - inside(values)
-        return (once - inside(once))[missing]
-    change, step = np.zeros(missing.sum()), -beyond(values)
+    def twice(values):
+        return part(part(values))[missing]
+    change, step = np.zeros(missing.sum()), -twice(values)
     residual, power = step, step @ step
     enough = _BRIDGED * power
     for _ in range(_STEPS):
@@ -177,7 +184,7 @@ def _bridged(values, missing, inside):
             break
         full = np.zeros(len(values))
         full[missing] = step
-        curved = beyond(full)
+        curved = twice(full)
         size = power / (step @ curved)
         change, residual = change + size * step, residual - size * curved
         power, before = residual @ residual, power

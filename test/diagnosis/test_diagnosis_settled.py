@@ -53,6 +53,23 @@ def test_one_quiet_instant_at_the_start_makes_no_course_of_the_motions_level(see
     assert {finding.cause for finding in found.findings} == {"warm_up_drift"}
 
 
+@pytest.mark.parametrize("follows", [False, pytest.param(True, marks=pytest.mark.thorough)])
+def test_a_drift_in_time_is_told_from_a_level_that_rises_with_it(follows):
+    """The two correlate by 0.96 and more, and one of them describes the record far better."""
+    rng = np.random.default_rng(11)
+    fine = FINER * RATE
+    time = np.arange(round(fine * DURATION_S)) / (fine * DURATION_S)
+    level = 0.6 + time + 0.1 * np.sin(2 * np.pi * (2.3 * time + rng.random()))
+    motion = level * sosfiltfilt(butter(4, [0.3, 20.0], "band", fs=fine, output="sos"),
+                                 rng.normal(size=len(time)))
+    assert np.corrcoef(level, time)[0, 1] > 0.96
+    zero = 0.1 * (level if follows else time)
+    record = sampled_pair(rng, (motion / motion.std(), motion / motion.std() + zero), FINER, RATE,
+                          0.005)
+    found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
+    assert ("offset_drift" in {finding.cause for finding in found.findings}) != follows
+
+
 def test_what_was_open_and_gave_way_to_another_cause_has_not_moved():
     engine = SimpleNamespace(loose={"sensitivity_error": None})
     assert moved(engine, SimpleNamespace(effects={}), {}, "") == ([], {})

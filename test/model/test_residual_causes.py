@@ -19,8 +19,8 @@ def bursts(rng, share):
     return inside
 
 
-def record(kind, seed):
-    """Instants, reference and what the sensor says."""
+def record(kind, seed, share=0.03):
+    """Instants, reference and what the sensor says; bursts take a share of the time."""
     rng = np.random.default_rng(seed)
     t, sine = times(N / RATE), Multisine(rng)
     scatter = 0.0
@@ -34,7 +34,7 @@ def record(kind, seed):
         scatter = 3e-4 * np.sin(2 * np.pi * 87.3 * t)
     values = sine.motion(t + scatter) + NOISE * rng.normal(size=N)
     if kind == "interference_bursts":
-        values += 0.3 * bursts(rng, 0.03) * rng.normal(size=N)
+        values += 0.3 * bursts(rng, share) * rng.normal(size=N)
     elif kind == "quantization":
         values = 0.153 * np.round((values + 0.018 * rng.normal(size=N)) / 0.153)
     elif kind == "spikes":
@@ -52,8 +52,8 @@ def record(kind, seed):
     return t, sine.acceleration(t), values
 
 
-def found(kind, seed):
-    t, reference, values = record(kind, seed)
+def found(kind, seed, share=0.03):
+    t, reference, values = record(kind, seed, share)
     return {f.cause: f for f in diagnose((samples(t, reference), samples(t, values)), model(),
                                          "x").findings}
 
@@ -70,6 +70,15 @@ def test_recognised_and_nothing_else(cause, truth, seed):
         assert abs(getattr(findings[cause].effect, name) / value - 1) < (
             0.3 if name == "share" else 0.15)
     assert findings[cause].gain.reduction > 0.1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bursts_of_an_eighth_of_the_time_are_no_other_noise(seed):
+    """More than a tenth was not short any more, and nothing predicted it."""
+    finding, = found("interference_bursts", seed, 0.125).values()
+    assert finding.cause == "interference_bursts"
+    assert finding.effect.share == pytest.approx(0.125, abs=0.02)
+    assert finding.effect.rms == pytest.approx(0.3, rel=0.1)
 
 
 @pytest.mark.parametrize("kind", ["nothing", "spikes", "gain noise", "moving delay",
