@@ -5,7 +5,7 @@ import functools
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import periodogram
+from scipy.signal import freqz, periodogram
 
 from ..model.effects import known_effects
 from ..record.resampling import filled, inner_taps
@@ -92,7 +92,8 @@ class Seen:
             max(clock.rate_hz / record.sampling_rate_hz, 1.0))
 
     def slope_beyond(self, noise):
-        """Power of the sensor's slope [output units an instant] beyond the band that is compared.
+        """Power of the sensor's slope [output units an instant] that the filter to the band which
+        is compared takes away.
 
         `noise` is the power that errors have within the band, and as densely beyond it.
         """
@@ -103,8 +104,10 @@ class Seen:
         turns, density = periodogram(values, topic.clock.rate_hz / record.sampling_rate_hz,
                                      window="hann")
         band = record.band_hz / record.sampling_rate_hz
-        moving = np.maximum(density - noise / band, 0.0)[turns > band]
-        return float(np.sum((2 * np.pi * turns[turns > band])**2 * moving) * turns[1])
+        moving = np.maximum(density - noise / band, 0.0)
+        taps = inner_taps(record.sampling_rate_hz, record.band_hz, len(self.output))
+        kept = np.where(turns < 0.5, np.abs(freqz(taps, worN=2 * np.pi * turns)[1])**2, 0.0)
+        return float(np.sum((2 * np.pi * turns)**2 * moving * (1 - kept)) * turns[1])
 
     def rounding(self):
         """Errors, shape (n,), that a coarse lattice leaves of noisy simulated values."""

@@ -33,16 +33,20 @@ def test_instants_scatter_by_a_tenth_of_the_interval(count, seed):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", range(2))
-def test_instants_of_a_faster_sensor_scatter(seed):
+@pytest.mark.parametrize("shape, smallest_s, largest_s", [
+    ((2, (0.5, 20.0)), 4e-4, 8e-4), ((8, (10.0, 56.0)), 2e-4, 4e-4)])
+def test_instants_of_a_faster_sensor_scatter(shape, smallest_s, largest_s, seed):
     """Each of its samples has less to say than one of as many as there are instants; it was said
-    that none of them could be told."""
+    that none of them could be told. What the filter to the common band took of the motion was
+    missing in its slope: 4 to 16 % too much scatter."""
     rng = np.random.default_rng([92, seed])
     fine, count = 4000.0, 24_000
-    motion = sosfiltfilt(butter(2, (0.5, 20.0), "band", fs=fine, output="sos"),
+    # 64 Hz are compared, and from 51 Hz on less and less
+    motion = sosfiltfilt(butter(*shape, "band", fs=fine, output="sos"),
                          rng.normal(size=20 * count + 80_000))[40_000:-40_000]
     motion *= (1 + 0.4 * np.sin(2 * np.pi * np.arange(len(motion)) / len(motion) * 7)) \
         / motion.std()
-    scatter_s = rng.uniform(4e-4, 8e-4)
+    scatter_s = rng.uniform(smallest_s, largest_s)
     every = np.arange(0, len(motion), 20), np.arange(0, len(motion), 25)
     stamps = [np.round(1e9 * taken / fine) for taken in every]
     reference = Samples.of(stamps[1], np.outer(motion[every[1]], [1.0, 0, 0]))
@@ -54,5 +58,5 @@ def test_instants_of_a_faster_sensor_scatter(seed):
                         SensorModel(Gain(1.0)))
     named, = found(scatter_s).findings
     assert named.cause == "sampling_jitter"
-    assert named.effect.rms_s == pytest.approx(scatter_s, rel=0.05)
+    assert abs(named.effect.rms_s - scatter_s) < 3 * named.std["rms_s"] < 0.15 * scatter_s
     assert found(0.0).findings == []

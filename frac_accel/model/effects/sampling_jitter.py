@@ -86,9 +86,11 @@ class SamplingJitter(Effect):
         known = squares["slope"].mean() / np.sum(around**2)
         less = known / (known + seen.slope_beyond(np.mean(error**2)))
         rms = float(np.sqrt(less * factor))
+        # the sum of all errors says it, too: by as much as it says otherwise the law may be wrong
+        other = np.sqrt(less * max(np.mean(error**2) - noise, 0.0) / both.mean())
         after = error * np.sqrt(noise / power)
         return cls(rms / rate), Reading(
-            {"rms_s": float(np.hypot(less * std / (2 * rms), (1 - less) * rms / 4) / rate)}, error,
-            after,
+            {"rms_s": float(np.sqrt((less * std / (2 * rms))**2 + ((1 - less) * rms / 4)**2
+                                    + (rms - other)**2) / rate)}, error, after,
             f"the error's power follows the square of the slope: {share:.0%} of it, "
             f"{factor / std:.3g} standard deviations from none")
