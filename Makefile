@@ -61,7 +61,7 @@ test-ros:
 # long, and what make test runs of numerical tests once more with the oldest libraries, where a
 # Python has them.
 test-all: setup docs
-	$(python) $(numerical) -m thorough
+	$(python) $(numerical) -m "thorough and not long"
 	@if $(find_oldest) >/dev/null; then $(MAKE) --no-print-directory test-oldest; else \
 	    echo "so the numerical suite was not run with numpy 1.26.4 and scipy 1.11.4"; fi
 

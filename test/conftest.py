@@ -39,6 +39,14 @@ MANY_DRAWS = """
     reference_faults residual_causes rig_accuracy rig_road rig_second_set rig_uncatalogued
     simulation_accuracy spring_uncertainty streaming_identity
 """.split()
+# Files in which the first seed of each kind counts as the file does.
+SEEDS = """
+    diagnosis_between_gaps diagnosis_companions diagnosis_courses diagnosis_high_pass
+    diagnosis_in_bands diagnosis_like_axes diagnosis_of_instruments diagnosis_of_joints
+    diagnosis_of_machines diagnosis_one_filter diagnosis_out_of_sight
+    diagnosis_scattered_instants diagnosis_settled diagnosis_sprung diagnosis_sticking
+    diagnosis_strong_spring
+""".split()
 
 
 def is_colcon(config):
@@ -60,13 +68,20 @@ def pytest_ignore_collect(collection_path, config):
     return None
 
 
+def parameters_of(item):
+    """Those that a test was given, by name."""
+    return item.callspec.params if hasattr(item, "callspec") else {}
+
+
 def pytest_collection_modifyitems(items):
     """Mark them; nothing is fast that is long or needs ROS or the real records."""
     seen = set()
     for item in items:
         file = item.path.stem.removeprefix("test_")
-        if file in MANY_DRAWS:
-            draw = item.path, item.originalname
+        if file in MANY_DRAWS or file in SEEDS:
+            kind = [(name, str(value)) for name, value in parameters_of(item).items()
+                    if name != "seed" and file in SEEDS]
+            draw = item.path, item.originalname, *kind
             if draw in seen:
                 item.add_marker(pytest.mark.long)
             seen.add(draw)

@@ -35,7 +35,7 @@ def found_in(rng, motion, sensor, frequency_hz, damping_ratio):
     return diagnose(pair, model)
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(0, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("seed", [1, 0])
 def test_another_sensor_that_is_plugged_in_is_no_step_of_gain(seed):
     """Its gain and its dynamics are others: `gain_step` and `time_step` were named. What they
     describe is in the extended model all the same."""

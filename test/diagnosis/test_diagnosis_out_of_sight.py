@@ -34,7 +34,7 @@ def sampled(rng, signals, noise):
         size=len(values) // OVERSAMPLING) for values, share in zip(signals, noise))
 
 
-@pytest.mark.parametrize("seed", [2, pytest.param(1, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("seed", [2, 1])
 def test_a_core_beyond_the_nyquist_frequency_is_no_filter_and_no_mode(seed):
     rng = np.random.default_rng(seed)
     motion = shaken_by_pulses(rng, 10_000.0, 40_000, 9, 2e-3, 400.0)
@@ -44,7 +44,7 @@ def test_a_core_beyond_the_nyquist_frequency_is_no_filter_and_no_mode(seed):
     assert found.verdict in ("consistent", "explained")
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("seed", [3, 4])
 def test_a_sharp_mount_is_named_beside_a_late_reference(seed):
     rng, rate, n = np.random.default_rng(seed), 2000.0, 40_000
     motion = random_motion(rng, rate, n, 4.0, 700.0)

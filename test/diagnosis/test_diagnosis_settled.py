@@ -45,7 +45,7 @@ def test_a_zero_that_has_settled_is_named(seed):
     assert found.extended["nrmse"] < 0.01
 
 
-@pytest.mark.parametrize("seed", [4, pytest.param(5, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("seed", [4, 5])
 def test_one_quiet_instant_at_the_start_makes_no_course_of_the_motions_level(seed):
     """That warmed something up in just such a course, it was said: no name."""
     record, size, constant_s = settling(seed, (60.0, 80.0), 2.5)
