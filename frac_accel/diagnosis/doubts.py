@@ -772,7 +772,7 @@ def _acausal(engine, best, stds):
     # by the stamps, or by the numbers of the samples: either may be when they were taken
     delay = sum(effect.pure_delay_s() for effect in effects if not effect.of_reference) \
         - min(p.record.lag_s, 0.0)
-    std = max((stds.get(cause, {}).get("delay_s", 0.0) for cause in own), default=0.0)
+    std = max((each.get("delay_s", 0.0) for each in stds.values()), default=0.0)
     if len(own) >= 2 and delay < 0 and delay <= -_ACAUSAL * std:
         return dict.fromkeys(own, f"together they come to a delay of {delay:.3g} s, which no "
                                   "sensor has: they imitate something else")

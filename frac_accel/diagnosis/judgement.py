@@ -22,6 +22,9 @@ _WEAKEST = 2
 _CLEAR = 10.0
 # Where nothing shows that what is left is noise, share of its power by which it must beat it.
 _NEARLY = 0.05
+# Share of what a cause takes (power) by which it must beat one that follows the temperature as it
+# was measured: a thermometer has noise and a place of its own.
+_AS_MEASURED = 1e-3
 # Share of what the largest cause takes (RMS) that a common one must take to be named for that.
 _COMMON = 0.1
 
@@ -65,8 +68,11 @@ def judge(engine, best, found, shown, noise_std=None):
                   if (not mirror or mirror not in causes) and not causes & doubted.keys()]
         alone = engine.stands_alone(best, cause, g.taken)
         margin, other = (np.inf, frozenset()) if alone or not rivals else rivals[0]
-        clear = max(_CLEAR, nearly * engine.comparing(cause).problem.count)
         instead = sorted(other - best.causes)
+        count = engine.comparing(cause).problem.count
+        clear = max(_CLEAR, nearly * count)
+        if any(effect_of(name).needs_temperature for name in instead):
+            clear = max(clear, _AS_MEASURED * g.taken**2 * count * engine.problem.count / best.cost)
         entry = Finding(best.effects[cause], stds[cause],
                         certainty(g) if alone else confidence(margin * _CLEAR / clear),
                         [*(instead if margin < 10 * _CLEAR else []), *([mirror] if mirror else [])],

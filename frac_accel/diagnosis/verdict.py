@@ -109,7 +109,7 @@ def verdict_on(engine, likely, found, shown_by):
     back = {}
     while True:
         named = _named(engine, likely, shown_by, back)
-        described = _described(engine, named, likely.widest)
+        described = _described(engine, named, (likely.widest, likely.best))
         more = _taken_back(engine, likely, named, described)
         if not more:
             return _told(engine, likely, named, described, found)
@@ -152,8 +152,8 @@ def _named(engine, likely, shown_by, back):
                  fraction, account, engine.structure(fitted))
 
 
-def _described(engine, named, widest):
-    """`Described`."""
+def _described(engine, named, sets):
+    """`Described`, by what is only suspected in one of some sets of causes (`Fitted`)."""
     fitted, account, strange = named.fitted, named.account, named.strange
     # beside a model that leaves nothing that stands out, what is only suspected is chance, and a
     # hint of structure in what is left is no reason to call the record unexplained
@@ -173,7 +173,12 @@ def _described(engine, named, widest):
     effects, words, after, output = _by_curves(
         engine, fitted, account.after, {part for _, part in strange},
         {f.cause for f in named.findings})
-    wider, known, after, output = _kept(engine, fitted, widest, after, output)
+    wider, known = None, {}
+    for each in {each.causes: each for each in sets}.values():
+        found = _kept(engine, named, each, after)
+        if found is not None:
+            wider, known, after = found
+            output = wider.output
     if wider is None:
         return Described(verdict, plain, effects, words, [], named.findings, after, output)
     # named causes are what they are in the model that is written
@@ -379,33 +384,31 @@ def _by_curves(engine, fitted, after, parts, named):
             output if described else None)
 
 
-def _kept(engine, fitted, widest, after, output):
+def _kept(engine, named, widest, after):
     """Fit of a set with causes that are only suspected, of linear ones and of such as change along
-    the record, where it predicts held-out data
-    clearly better than all else that describes them, its standard uncertainties, its held-out error
-    and its output; or None, nothing, and those given."""
-    p, rest = engine.problem, engine.held_out_rows
+    the record, where it predicts held-out data clearly better than all else that describes them
+    (`after`), its standard uncertainties and its held-out error; or None."""
+    p, rest, fitted = engine.problem, engine.held_out_rows, named.fitted
     more = {cause: effect for cause, effect in widest.effects.items()
             if cause not in fitted.causes and (is_link(effect) or effect.pure_delay_s()
                                                or effect.is_constant or effect.restates_core
                                                or effect.shows_with_time)}
     if not more or p.limit.ends_judging("what is only suspected was not kept as a description"):
-        return None, {}, after, output
+        return None
     slow = [effect for effect in {**more, **fitted.effects}.values() if effect.acts_on_slow_motion]
     if len(slow) > 1:
-        return None, {}, after, output  # they cancel but for a free motion, which no model can have
+        return None  # they cancel but for a free motion, which no model can have
     wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
     errors = [(p.measured - engine.learnt(fit).output)[rest] for fit in (fitted, wider)]
     error = rms_of(p.measured - wider.output, rest)
     better = gain(*errors)
     if not better.is_relevant or engine.hollow(wider) \
             or max(error, rms_of(errors[1], slice(None))) > _CLEARLY * after:
-        return None, {}, after, output
+        return None
     stds = engine.uncertainties(wider)
-    if left_open(engine, wider, stds,
-                 wider.causes & fitted.causes - engine.search.base.keys()):
-        return None, {}, after, output
-    return wider, stds, error, wider.output
+    if left_open(engine, wider, stds, wider.causes & {f.cause for f in named.findings}):
+        return None
+    return wider, stds, error
 
 
 def _of_reference(engine, effects, named):

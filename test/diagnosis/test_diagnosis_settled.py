@@ -70,6 +70,19 @@ def test_a_drift_in_time_is_told_from_a_level_that_rises_with_it(follows):
     assert ("offset_drift" in {finding.cause for finding in found.findings}) != follows
 
 
+def test_a_zero_that_settles_with_a_measured_temperature_may_follow_either():
+    """A thermometer's own noise made the law in time the better one by some variances of the
+    noise, and it was named. What both describe stays in the model."""
+    record, size, constant_s = settling(21, (30.0, 40.0))
+    rng = np.random.default_rng(22)
+    stamps, time = record[0].stamps_ns[::100], np.arange(0.0, DURATION_S)
+    celsius = 25 + 8 * np.exp(-time / constant_s) + rng.normal(0, 0.03, len(time))
+    found = diagnose(record, SensorModel(Gain(1.0)), temperature=(stamps, celsius),
+                     time_limit_s=60)
+    assert "warm_up_drift" not in {finding.cause for finding in found.findings}
+    assert found.extended["nrmse"] < 0.012 < 0.03 < found.baseline["nrmse"]
+
+
 def test_what_was_open_and_gave_way_to_another_cause_has_not_moved():
     engine = SimpleNamespace(loose={"sensitivity_error": None})
     assert moved(engine, SimpleNamespace(effects={}), {}, "") == ([], {})
