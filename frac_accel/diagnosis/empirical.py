@@ -1,6 +1,7 @@
 """A filter that describes what no known cause explains."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
@@ -11,6 +12,8 @@ from ..signals.convolution import Convolution
 from .gain import Gain, gain
 
 _ORDERS = (1, 2, 3, 4, 6)
+# What a filter of too low an order does best: what is known best, or what makes most of the output.
+_WEIGHTS = ("known", "loud")
 _LONGEST_SEGMENT, _SHORTEST_SEGMENT = 4096, 32
 _FEWEST_SEGMENTS = 8
 # Reweighted linear fits, which converge within a few.
@@ -84,11 +87,10 @@ def fit_empirical_link(measured, simulated, used, held_out, sampling_rate_hz):
               for a in (0, 1)]
     delays = sorted({0.0, every.delay_s()}, key=abs)
     best, chosen = np.inf, None
-    for order in _ORDERS:
-        for delay in delays:
-            error = sum(other.error(one.fit(order, delay)) for one, other in halves)
-            if error < (_CLEARLY if chosen else 1.0) * best:
-                best, chosen = error, (order, delay)
+    for how in itertools.product(_ORDERS, delays, _WEIGHTS):
+        error = sum(other.error(one.fit(*how)) for one, other in halves)
+        if error < (_CLEARLY if chosen else 1.0) * best:
+            best, chosen = error, how
     effect = every.fit(*chosen)
     convolution = Convolution(simulated - simulated[0], rate, abs(effect.delay_s))
     s = convolution.s
@@ -127,15 +129,16 @@ class _Response:
         self.ratio = shared / np.maximum(own, 1e-300)
         coherence = np.clip(np.abs(shared)**2 / np.maximum(own * other, 1e-300), 1e-6, 1 - 1e-9)
         variance = np.abs(self.ratio)**2 * (1 - coherence) / (2 * len(x) * coherence)
-        strong = own > 1e-6 * own.max()
+        self.strong = own > 1e-6 * own.max()
         # no better known than in a hundredth of its spread: leakage is as large
-        self.weight = np.where(strong, 1 / np.sqrt(variance + 1e-8), 0.0)
+        self.weights = {"known": 1 / np.sqrt(variance + 1e-8),
+                        "loud": np.sqrt(own / own.max()) * 1e4}
         self.power = own
-        self.band_hz = tuple(self.frequency[strong][[0, -1]].tolist())
+        self.band_hz = tuple(self.frequency[self.strong][[0, -1]].tolist())
 
     def delay_s(self):
         """Slope of the phase over frequency, where there is power."""
-        share = np.sqrt(self.power) * (self.weight > 0)
+        share = np.sqrt(self.power) * self.strong
         phase, wave = np.unwrap(np.angle(self.ratio)), 2 * np.pi * self.frequency
         return float(-np.sum(share * phase * wave) / np.sum(share * wave**2))
 
@@ -143,17 +146,18 @@ class _Response:
         """Power of what a filter leaves, over that of the output."""
         s = 2j * np.pi * self.frequency
         left = self.ratio - effect.transfer_function(s) * np.exp(-s * effect.delay_s)
-        counted = self.power * (self.weight > 0)
+        counted = self.power * self.strong
         return float(np.sum(counted * np.abs(left)**2) / np.sum(counted * np.abs(self.ratio)**2))
 
-    def fit(self, order, delay_s):
-        """EmpiricalLink of an order."""
+    def fit(self, order, delay_s, weight):
+        """EmpiricalLink of an order, best where the response is `known` best, or where the motion
+        is `loud`."""
         scale = self.band_hz[1]
         u = 1j * self.frequency / scale
         wanted = self.ratio * np.exp(2j * np.pi * self.frequency * delay_s)
         # where nothing is known: about one
-        weight = np.where(self.weight > 0, self.weight, 1.0)
-        wanted = np.where(self.weight > 0, wanted, 1.0)
+        weight = np.where(self.strong, self.weights[weight], 1.0)
+        wanted = np.where(self.strong, wanted, 1.0)
         powers = u[:, None]**np.arange(order, -1, -1)
         denominator = np.r_[1.0, np.zeros(order)]
         old = np.ones(len(u))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from exact_sines import RATE, oscillator, record, samples
+from scipy.signal import bilinear, butter, lfilter, sosfilt
 
 from frac_accel import Corrector, diagnose
 from frac_accel.diagnosis.empirical import fit_empirical_link
@@ -31,6 +32,25 @@ def test_describes_an_unknown_filter_down_to_the_noise(seed):
     response = found.effect.transfer_function(s) * np.exp(-s * found.effect.delay_s)
     assert np.sqrt(np.mean(np.abs(response - two_modes(s))**2)) < 0.03
     assert np.all(found.effect.poles().real < 0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_loud_is_described_beside_quiet_modes_that_are_known_better(seed):
+    """Of more modes than a filter has, those far above the motion, which stood out of less noise,
+    were described: 11 to 17 % was left instead of 8."""
+    rng, n, rate = np.random.default_rng([31, seed]), 40_000, 500.0
+
+    def mode(motion, frequency_hz, ratio):
+        w = 2 * np.pi * frequency_hz
+        return lfilter(*bilinear([w**2], [1, 2 * ratio * w, w**2], rate), motion)
+    motion = sosfilt(butter(2, [0.5, 6], "band", fs=rate, output="sos"), rng.normal(size=n))
+    motion = motion / motion.std() + 0.02 * rng.normal(size=n)
+    sensor = motion + 0.3 * mode(motion, rng.uniform(2, 4), 0.1) + 1e-3 * rng.normal(size=n)
+    for frequency_hz in (31, 52, 77, 101, 138, 170, 201):
+        sensor += rng.uniform(0.5, 2) * mode(motion, frequency_hz, 0.01)
+    rest = np.arange(n) // 1000 % 4 == 0
+    found = fit_empirical_link(sensor, motion, np.ones(n, bool), rest, rate)
+    assert found.gain.after < 0.09 * found.gain.before
 
 
 @pytest.mark.parametrize("seed", range(4))
