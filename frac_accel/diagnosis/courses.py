@@ -8,6 +8,7 @@ from ..budget.modulated import Modulated, cosines
 from ..model.effects import known_effects
 from ..model.effects.base import OFFSET
 from ..model.effects.course import KNOTS
+from .empirical import EmpiricalFit
 from .finding import Finding
 from .gain import certainty, gain
 from .words import gain_words
@@ -154,14 +155,26 @@ def _is_slow(engine, best, cause, cls):
     return taken @ taken > _SLOW * (added @ added)
 
 
-def _left(p, column, target, half_waves):
+def fit_empirical_zero(p, output, rest):
+    """Course of the zero that describes what an output leaves (`EmpiricalFit`; its `order` is the
+    number of half waves), learnt on all but the rows that are held out."""
+    cls, = (cls for cls in known_effects().values() if cls.half_waves and _adds(cls))
+    learn, target = p.used & ~rest, p.measured - output
+    _, waves, _ = _left(p, np.ones(len(output)), target, cls.half_waves, learn)
+    effect = _through(p, cls, output, target, waves, learn)
+    course = np.interp(p.record.since_start_s + p.time, effect.course_at_s, _values(effect))
+    return EmpiricalFit(effect, waves, None, gain(target[rest], (target - course)[rest]))
+
+
+def _left(p, column, target, half_waves, used=None):
     """Share of a target's power that a course leaves, of what a constant does, in blocks that it
     has not seen; its half waves, and that power."""
     blocks = Blocks(np.unique(np.linspace(0, len(target), 41).astype(int)))
-    courses = Modulated(lambda start, stop: column[start:stop, None], target, p.used, blocks)
+    used = p.used if used is None else used
+    courses = Modulated(lambda start, stop: column[start:stop, None], target, used, blocks)
 
     def power(waves):
-        error = (target - courses.predict(range(waves + 1), _columns)) * p.used
+        error = (target - courses.predict(range(waves + 1), _columns)) * used
         return float(error @ error)
     constant = power(0)
     least, chosen = constant, 0
@@ -198,9 +211,9 @@ def _to_be_described(p, kept, cls):
             p.simulate({c: e for c, e in kept.items() if e.stage < cls.stage}))
 
 
-def _through(p, cls, before, target, waves):
+def _through(p, cls, before, target, waves, used=None):
     """Effect with the course of so many half waves that describes a target best."""
-    rows, orders, length = p.used, range(waves + 1), p.time[-1]
+    rows, orders, length = p.used if used is None else used, range(waves + 1), p.time[-1]
     columns = _columns(p.time[rows] / length, orders) * cls.column(before)[rows, None]
     place = np.linspace(0.0, 1.0, KNOTS)
     at_knots = _columns(place, orders)

@@ -353,12 +353,15 @@ def _by_curves(engine, fitted, after, parts, named):
     """What stands for what no cause explains, by cause, with a constant that has no name as it is
     beside it; its words, the held-out error, and the output with it (None without).
 
-    A fitted filter where a part of it is linear, and a fitted curve where one is even or odd.
+    A fitted course of the zero where a part of it is slow, a fitted filter where one is linear, and
+    a fitted curve where one is even or odd.
     """
     p, described = engine.problem, []
     rest, effects, output = engine.held_out_rows, fitted.effects, fitted.output
     constants = constants_of(effects) - engine.search.base.keys() - named
     for belongs, words, fit in (
+            ({"slow"}, "a fitted course of the zero", lambda output: courses.fit_empirical_zero(
+                p, output, rest)),
             ({"linear"}, "a fitted filter", lambda output: fit_empirical_link(
                 p.measured, output, p.used, rest, p.rate)),
             ({"even", "odd"}, "a fitted curve", lambda output: fit_empirical_map(
@@ -369,6 +372,8 @@ def _by_curves(engine, fitted, after, parts, named):
             continue
         try:
             found = fit(output)
+            if found.effect.cause in effects:
+                continue
             more = {**effects, found.effect.cause: found.effect}
             if constants:  # it makes another level of the motion's mean
                 more = p.fit(more, held=more.keys() - constants).effects

@@ -10,6 +10,7 @@ from scipy.signal import butter, sosfiltfilt
 from frac_accel import SensorModel, diagnose
 from frac_accel.diagnosis.naming import moved
 from frac_accel.model.core import Gain
+from frac_accel.validation import validate
 
 RATE, FINER, DURATION_S = 100.0, 4, 240.0
 
@@ -68,6 +69,10 @@ def test_a_drift_in_time_is_told_from_a_level_that_rises_with_it(follows):
                           0.005)
     found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
     assert ("offset_drift" in {finding.cause for finding in found.findings}) != follows
+    # without a name it is described: 0.0052 is noise
+    assert found.extended["nrmse"] < 0.012 < 0.03 < found.baseline["nrmse"]
+    assert found.extended["nrmse"] == pytest.approx(
+        validate(record, found.model).whole_nrmse, rel=0.2)
 
 
 def test_a_zero_that_settles_with_a_measured_temperature_may_follow_either():
