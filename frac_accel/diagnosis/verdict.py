@@ -391,13 +391,14 @@ def _by_curves(engine, fitted, after, parts, named):
 
 def _kept(engine, named, widest, after):
     """Fit of a set with causes that are only suspected, of linear ones and of such as change along
-    the record, where it predicts held-out data clearly better than all else that describes them
-    (`after`), its standard uncertainties and its held-out error; or None."""
+    the record or with temperature, where it predicts held-out data clearly better than all else
+    that describes them (`after`), its standard uncertainties and its held-out error; or None."""
     p, rest, fitted = engine.problem, engine.held_out_rows, named.fitted
     more = {cause: effect for cause, effect in widest.effects.items()
             if cause not in fitted.causes and (is_link(effect) or effect.pure_delay_s()
                                                or effect.is_constant or effect.restates_core
-                                               or effect.shows_with_time)}
+                                               or effect.counts_from_start
+                                               or effect.needs_temperature)}
     if not more or p.limit.ends_judging("what is only suspected was not kept as a description"):
         return None
     slow = [effect for effect in {**more, **fitted.effects}.values() if effect.acts_on_slow_motion]

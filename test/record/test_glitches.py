@@ -82,7 +82,7 @@ def test_a_faulty_reference_gives_the_sensor_no_name(kind):
     """Bursts of interference were named, or noise of the reference."""
     rng = np.random.default_rng([994, len(kind)])
     true, sensor = pair(rng)
-    found = diagnose((samples(spoiled(rng, true, kind)[0]), samples(sensor)))
+    found = diagnose((samples(spoiled(rng, true, kind)[0]), samples(sensor)), time_limit_s=60)
     assert [finding.cause for finding in found.findings if finding.cause != "low_pass_lag"] == []
     assert found.extended["nrmse"] < 0.04
     words, = (words for words in found.integrity.words if "reference alone" in words)
