@@ -407,8 +407,10 @@ def _kept(engine, named, widest, after):
     wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
     errors = [(p.measured - engine.learnt(fit).output)[rest] for fit in (fitted, wider)]
     error = rms_of(p.measured - wider.output, rest)
+    # a file says nothing of a free motion, which may do what its causes do not
+    written, before = (rms_of(p.measured - fit.simulated, rest) for fit in (wider, fitted))
     better = gain(*errors)
-    if not better.is_relevant or engine.hollow(wider) \
+    if not better.is_relevant or engine.hollow(wider) or written > _CLEARLY * max(after, before) \
             or max(error, rms_of(errors[1], slice(None))) > _CLEARLY * after:
         return None
     stds = engine.uncertainties(wider)

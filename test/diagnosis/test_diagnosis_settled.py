@@ -9,7 +9,9 @@ from scipy.signal import butter, sosfiltfilt
 
 from frac_accel import SensorModel, diagnose
 from frac_accel.diagnosis.naming import moved
+from frac_accel.diagnosis.verdict import _kept
 from frac_accel.model.core import Gain
+from frac_accel.model.effects import effect_of
 from frac_accel.validation import validate
 
 RATE, FINER, DURATION_S = 100.0, 4, 240.0
@@ -86,6 +88,27 @@ def test_a_zero_that_settles_with_a_measured_temperature_may_follow_either():
                      time_limit_s=60)
     assert "warm_up_drift" not in {finding.cause for finding in found.findings}
     assert found.extended["nrmse"] < 0.012 < 0.03 < found.baseline["nrmse"]
+
+
+@pytest.mark.parametrize("is_written", [True, False])
+def test_what_a_free_motion_describes_is_in_no_model_file(is_written, monkeypatch):
+    """1.0 % was claimed of a scan, and the file left 61 %: a high-pass with a motion of its own."""
+    monkeypatch.setattr("frac_accel.diagnosis.verdict.left_open", lambda *given: {})
+    rng = np.random.default_rng(31)
+    measured = np.cumsum(rng.normal(size=4000))
+    described = measured + 0.1 * rng.normal(size=4000)
+    high_pass = effect_of("ac_coupling")(0.01)
+    fitted = SimpleNamespace(effects={}, causes=set(), output=0 * measured, simulated=0 * measured)
+    wider = SimpleNamespace(effects={"ac_coupling": high_pass}, causes={"ac_coupling"},
+                            output=described, simulated=described if is_written else -measured)
+    engine = SimpleNamespace(
+        problem=SimpleNamespace(measured=measured,
+                                limit=SimpleNamespace(ends_judging=lambda words: False)),
+        held_out_rows=np.arange(4000) % 1000 > 700, learnt=lambda fit: fit,
+        search=SimpleNamespace(fit=lambda effects: wider, to_its_best=lambda fit: fit),
+        hollow=lambda fit: False, uncertainties=lambda fit: {})
+    kept = _kept(engine, SimpleNamespace(fitted=fitted, findings=[]), wider, measured.std())
+    assert (kept is not None) == is_written
 
 
 def test_what_was_open_and_gave_way_to_another_cause_has_not_moved():
