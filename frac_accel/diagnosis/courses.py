@@ -92,15 +92,15 @@ def course_of(engine, best):
             continue
         kept = _without_the_like(engine, best, cls)
         target, before = _to_be_described(p, kept, cls)
-        left, waves, power = _left(p, cls.column(before), target, cls.half_waves)
+        left, waves, power = _left(cls.column(before), target, cls.half_waves, p.used)
         if left > 1 - _TAKES or power > _allowed(best.effects, kept) * own_power:
             continue
-        others = [_left(p, column, target, cls.half_waves)[0] for column in
+        others = [_left(column, target, cls.half_waves, p.used)[0] for column in
                   (np.ones(len(before)), before, np.gradient(before))
                   if not np.array_equal(column, cls.column(before))]
         if min(others) < _CLEARLY * left:
             continue
-        effect = _through(p, cls, before, target, waves)
+        effect = _through(p, cls, before, target, waves, p.used)
         values, weight = _values(effect), _mean(cls.column(before)**2, p.used)
         if _as_level(values, weight, before, p.used, waves) < _ALIKE \
                 and not (_adds(cls) and _as_motion(values, weight, before, p.used)):
@@ -160,17 +160,16 @@ def fit_empirical_zero(p, output, rest):
     number of half waves), learnt on all but the rows that are held out."""
     cls, = (cls for cls in known_effects().values() if cls.half_waves and _adds(cls))
     learn, target = p.used & ~rest, p.measured - output
-    _, waves, _ = _left(p, np.ones(len(output)), target, cls.half_waves, learn)
+    _, waves, _ = _left(np.ones(len(output)), target, cls.half_waves, learn)
     effect = _through(p, cls, output, target, waves, learn)
     course = np.interp(p.record.since_start_s + p.time, effect.course_at_s, _values(effect))
     return EmpiricalFit(effect, waves, None, gain(target[rest], (target - course)[rest]))
 
 
-def _left(p, column, target, half_waves, used=None):
+def _left(column, target, half_waves, used):
     """Share of a target's power that a course leaves, of what a constant does, in blocks that it
     has not seen; its half waves, and that power."""
     blocks = Blocks(np.unique(np.linspace(0, len(target), 41).astype(int)))
-    used = p.used if used is None else used
     courses = Modulated(lambda start, stop: column[start:stop, None], target, used, blocks)
 
     def power(waves):
@@ -200,8 +199,8 @@ def refined(engine, effects):
         cls = type(effect)
         kept = {name: other for name, other in fit.effects.items() if name != cause}
         target, before = _to_be_described(p, kept, cls)
-        _, waves, _ = _left(p, cls.column(before), target, cls.half_waves)
-        result[cause] = _through(p, cls, before, target, waves)
+        _, waves, _ = _left(cls.column(before), target, cls.half_waves, p.used)
+        result[cause] = _through(p, cls, before, target, waves, p.used)
     return result
 
 
@@ -211,9 +210,9 @@ def _to_be_described(p, kept, cls):
             p.simulate({c: e for c, e in kept.items() if e.stage < cls.stage}))
 
 
-def _through(p, cls, before, target, waves, used=None):
+def _through(p, cls, before, target, waves, rows):
     """Effect with the course of so many half waves that describes a target best."""
-    rows, orders, length = p.used if used is None else used, range(waves + 1), p.time[-1]
+    orders, length = range(waves + 1), p.time[-1]
     columns = _columns(p.time[rows] / length, orders) * cls.column(before)[rows, None]
     place = np.linspace(0.0, 1.0, KNOTS)
     at_knots = _columns(place, orders)
@@ -298,10 +297,11 @@ def with_level(engine, best, added):
         if np.sum((change - told * column)[p.used]**2) > (1 - _SLOW) * np.sum(change[p.used]**2):
             continue
         alike = _as_level(course, weight, before, p.used)
+        if alike <= _ALIKE:
+            continue
         whole = course + _mean(best.residual * column, p.used) / np.maximum(weight, 1e-300)
-        by_law, by_level = (1 - _alike(whole, weight, course),
-                            1 - _as_level(whole, weight, before, p.used))
-        if alike > _ALIKE and (cause in engine.search.courses or by_level < _CLEARLY * by_law):
+        if cause in engine.search.courses or 1 - _as_level(whole, weight, before, p.used) \
+                < _CLEARLY * (1 - _alike(whole, weight, course)):
             found[cause] = f"the motion's level changes in the same way (correlation " \
                            f"{np.sqrt(alike):.2f}): it may follow the motion, not time"
     return found

@@ -12,8 +12,6 @@ from ..signals.convolution import Convolution
 from .gain import Gain, gain
 
 _ORDERS = (1, 2, 3, 4, 6)
-# What a filter of too low an order does best: what is known best, or what makes most of the output.
-_WEIGHTS = ("known", "loud")
 _LONGEST_SEGMENT, _SHORTEST_SEGMENT = 4096, 32
 _FEWEST_SEGMENTS = 8
 # Reweighted linear fits, which converge within a few.
@@ -87,7 +85,7 @@ def fit_empirical_link(measured, simulated, used, held_out, sampling_rate_hz):
               for a in (0, 1)]
     delays = sorted({0.0, every.delay_s()}, key=abs)
     best, chosen = np.inf, None
-    for how in itertools.product(_ORDERS, delays, _WEIGHTS):
+    for how in itertools.product(_ORDERS, delays, every.weights):
         error = sum(other.error(one.fit(*how)) for one, other in halves)
         if error < (_CLEARLY if chosen else 1.0) * best:
             best, chosen = error, how
@@ -130,6 +128,7 @@ class _Response:
         coherence = np.clip(np.abs(shared)**2 / np.maximum(own * other, 1e-300), 1e-6, 1 - 1e-9)
         variance = np.abs(self.ratio)**2 * (1 - coherence) / (2 * len(x) * coherence)
         self.strong = own > 1e-6 * own.max()
+        # what a filter of too low an order does best: what is known best, or is most of the output;
         # no better known than in a hundredth of its spread: leakage is as large
         self.weights = {"known": 1 / np.sqrt(variance + 1e-8),
                         "loud": np.sqrt(own / own.max()) * 1e4}

@@ -15,7 +15,7 @@ from .lattice import lattice_step, stuck_bit
 _FEWEST = 32
 # Scatter of the stamps [sampling intervals] below which it counts as none.
 _JITTER = 2e-4
-# Times the scatter that rounding to the stamps' unit makes (its twelfth, squared), which it may be.
+# Times the scatter that rounding to the stamps' unit makes up to which it is made by that.
 _BY_ROUNDING = 1.1
 # A gap of both topics: half an interval at its ends, which may be jitter; samples that the other
 # one would have in it, at least, to tell; share of them that it may have. Share of the rate from
@@ -43,7 +43,7 @@ class Integrity:
         Limits at which samples pile up.
     words : list of str
     rounds_stamps : bool
-        Whether they scatter by no more than their own rounding makes.
+        Whether the stamps scatter by no more than their own rounding makes.
     reference_noise : budget.reference_noise.ReferenceNoise or None
         Of the other topic, where the two together show it.
     """

@@ -31,7 +31,7 @@ def gain_of_one(record):
     return diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", range(2))
 def test_a_gain_that_settles_is_no_step(seed):
     rng = np.random.default_rng(seed)
     motion = moving(rng)
@@ -72,7 +72,7 @@ def on_a_mount(motion, frequency_hz, ratio):
                              [1, 2 * ratio * omega, omega**2], FINE), motion)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", range(2))
 def test_a_soft_mount_and_limits_are_told_without_a_model(seed):
     rng = np.random.default_rng(seed)
     motion = moving(rng, (0.5, 80.0), 60.0)
@@ -128,7 +128,7 @@ def test_clocks_seconds_apart_are_set_right_in_a_narrow_band(seed):
     assert record.taken_out_s == pytest.approx(1e-9 * late_ns, abs=2e-3)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", range(2))
 def test_a_turn_is_named_beside_a_noisy_reference(seed):
     rng = np.random.default_rng(seed)
     axes = [moving(rng, (0.3, 30.0)) for _ in range(3)]
@@ -157,7 +157,7 @@ def test_samples_between_those_of_the_reference_lead_by_nothing(seed):
                                                                   "ac_coupling"}
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", range(2))
 def test_a_dead_zone_is_named_beside_a_slower_reference(seed):
     rng = np.random.default_rng(seed)
     motion = moving(rng, (0.2, 2.5))

@@ -58,5 +58,6 @@ def test_instants_of_a_faster_sensor_scatter(shape, smallest_s, largest_s, seed)
                         SensorModel(Gain(1.0)))
     named, = found(scatter_s).findings
     assert named.cause == "sampling_jitter"
+    assert named.effect.rms_s == pytest.approx(scatter_s, rel=0.05)
     assert abs(named.effect.rms_s - scatter_s) < 3 * named.std["rms_s"] < 0.15 * scatter_s
     assert found(0.0).findings == []
