@@ -85,12 +85,20 @@ class Filters:
         ndarray, shape (n,)
         """
         if self._step > 1:
-            counted = self._all if left_out is None else self._all & ~left_out
-            values = _thinned(np.where(counted, target, 0.0), self._step) \
-                / np.maximum(_thinned(counted.astype(float), self._step), 1e-3)
+            values = self._slower(target, self._all if left_out is None else self._all & ~left_out)
             result = self._predict(values, None if left_out is None else left_out[::self._step])
             return _thickened(result, self._step, len(target))
         return self._predict(target, left_out)
+
+    def learnt(self, target):
+        """The weights that all counted samples give, shape (size,), and the share of the target's
+        power that those of the folds leave of what they have not seen."""
+        values = self._slower(target, self._all) if self._step > 1 else target
+        values = np.where(self._used, values, 0.0)
+        judged, whole = self._products_with(values)
+        best, ridge, gained = self._best_weights(self._whole, self._unseen, whole, judged)
+        power = sum(np.sum(values[start:stop]**2) for start, stop in self._runs)
+        return solve(self._whole, whole, ridge), 1 - gained / max(power, 1e-300)
 
     def passed(self, target, others):
         """Other signals through the filter of the first input that fits a target best.
@@ -124,20 +132,30 @@ class Filters:
             total, by_fold = self._products_of(np.flatnonzero(left_out & self._used))
             gram, unseen = gram - total, unseen - by_fold
         values = np.where(used, target, 0.0)
-        judged = np.zeros((FOLDS, self.size))
-        for block, run in enumerate(self._runs):
-            judged[block % FOLDS] += self._right(values, *run)
-        whole = judged.sum(axis=0) if self._learnt is self._runs \
-            else self._right(values, *self._learnt[0])
-        best = self._held_out(self._best_weights(gram, unseen, whole, judged))
+        judged, whole = self._products_with(values)
+        best = self._held_out(self._best_weights(gram, unseen, whole, judged)[0])
         for edge in (slice(0, self._first), slice(self._last, None)):
             if np.sum(((2 * values - best) * best * used)[edge]) < 0:
                 best[edge] = 0.0
         return best
 
+    def _slower(self, target, counted):
+        """Every step-th sample of a target, smoothed as the inputs are."""
+        return _thinned(np.where(counted, target, 0.0), self._step) \
+            / np.maximum(_thinned(counted.astype(float), self._step), 1e-3)
+
+    def _products_with(self, values):
+        """Products of the inputs with a target: by the folds that judge them, and of all."""
+        judged = np.zeros((FOLDS, self.size))
+        for block, run in enumerate(self._runs):
+            judged[block % FOLDS] += self._right(values, *run)
+        return judged, judged.sum(axis=0) if self._learnt is self._runs \
+            else self._right(values, *self._learnt[0])
+
     def _best_weights(self, gram, unseen, whole, judged):
-        """Weights of each fold, by the ridge that takes most from what they have not seen."""
-        best, most = None, -np.inf
+        """Weights of each fold, by the ridge that takes most from what they have not seen; that
+        ridge, and what is taken."""
+        best, chosen, most = None, _RIDGES[0], -np.inf
         for ridge in _RIDGES:
             weights = [solve(gram - other, whole - right, ridge)
                        for other, right in zip(unseen, judged)]
@@ -145,8 +163,8 @@ class Filters:
                        for w, right, other in zip(weights, judged, unseen))
             if gain <= most:
                 break
-            best, most = weights, gain
-        return best
+            best, chosen, most = weights, ridge, gain
+        return best, chosen, most
 
     def _held_out(self, weights):
         """Each block's output of the filter that the others give."""

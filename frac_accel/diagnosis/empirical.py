@@ -6,18 +6,35 @@ import itertools
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 
+from ..budget.blocks import FOLDS, Blocks
+from ..budget.filters import Filters
 from ..errors import FracAccelError
 from ..model.effects import effect_of
 from ..signals.convolution import Convolution
 from .gain import Gain, gain
+from .rational import fit_rational, real_solution
 
 _ORDERS = (1, 2, 3, 4, 6)
+_MORE_ORDERS = (1, 2, 3, 4, 6, 8, 12, 16)
+# Lags of the filters, the first and the last; samples for each of them; where the power of both
+# signals ends, lags in a cycle there, and the fewest samples that are left.
+_LAGS = ((-4, 8), (-16, 32), (-48, 96), (-96, 192))
+_SAMPLES = 10
+_HIGHEST, _FASTER, _FEWEST = 0.999, 4, 1000
+# Shares of their energy at which weights begin, and a response's power over the largest from which
+# it is known.
+_BEGINS = (1e-4, 1e-2)
+_STRONG = 1e-6
+# Size of a pole over the highest frequency.
+_FASTEST = 4.0
 _LONGEST_SEGMENT, _SHORTEST_SEGMENT = 4096, 32
 _FEWEST_SEGMENTS = 8
 # Reweighted linear fits, which converge within a few.
 _PASSES = 12
 # A larger order must bring the error on the other segments below this share.
 _CLEARLY = 0.9
+# And so must weights over more samples than those that are known.
+_LONGER = 0.95
 # Held-out error that a description must take away to be worth having.
 _WORTH = 0.02
 
@@ -51,11 +68,12 @@ class EmpiricalFit:
 def fit_empirical_link(measured, simulated, used, held_out, sampling_rate_hz):
     r"""Stable rational filter from simulated to measured output.
 
-    The ratio of averaged spectra, :math:`H = S_{xy} / S_{xx}` with the variance
-    :math:`|H|^2 (1 - \gamma^2) / (2 K \gamma^2)`, is fitted by reweighted linear least squares
-    (C. K. Sanathanan, J. Koerner, *IEEE Trans. Automatic Control* 8 (1963) 56-58); unstable poles
-    are mirrored. Where there is no power the filter is drawn to one. The order is the smallest that
-    predicts every other segment about as well as any; only then are the held-out samples asked.
+    Two responses are fitted: the ratio of averaged spectra, :math:`H = S_{xy} / S_{xx}` with the
+    variance :math:`|H|^2 (1 - \gamma^2) / (2 K \gamma^2)`, which resolves what rings for long, and
+    that of the weights of a filter of so many samples before and after, by least squares, which
+    needs no stretches without a gap. A filter that looks ahead becomes a lead and a rational filter
+    that is as late. Where there is no power both are drawn to one. The order is the smallest that
+    does about as well on what it was not fitted to; only then are the held-out samples asked.
 
     Parameters
     ----------
@@ -75,11 +93,37 @@ def fit_empirical_link(measured, simulated, used, held_out, sampling_rate_hz):
         If too few samples are left to learn from.
     """
     rate, learn = sampling_rate_hz, used & ~held_out
-    mean = float(np.mean((measured - simulated)[learn])) if learn.any() else 0.0
-    x, y = _segments(simulated, learn), _segments(measured, learn)
-    if len(x) < _FEWEST_SEGMENTS:
+    found = [fit for fit in (_by_spectra(measured, simulated, learn, rate),
+                             _by_lags(measured, simulated, learn, rate)) if fit is not None]
+    if not found:
         raise FracAccelError(f"{int(learn.sum())} samples to learn a filter from, expected "
                              f"{_FEWEST_SEGMENTS} stretches without a gap")
+    best, least = None, np.inf
+    for order, effect, band_hz in found:
+        described = _described(effect, simulated, rate)
+        errors = measured - described - float(np.mean((measured - described)[learn]))
+        left = float(np.std(errors[learn]))
+        if left < (_LONGER if best else 1.0) * least:
+            least, best = left, (effect, order, band_hz, errors)
+    rows = used & held_out
+    mean = float(np.mean((measured - simulated)[learn]))
+    return EmpiricalFit(*best[:3], gain((measured - simulated - mean)[rows], best[3][rows]))
+
+
+def _described(effect, simulated, rate):
+    """Simulated output through a filter; before the first sample it stood still there."""
+    convolution = Convolution(simulated - simulated[0], rate, abs(effect.delay_s))
+    s = convolution.s
+    level = float(effect.transfer_function(np.zeros(1))[0].real)
+    return convolution.response(effect.transfer_function(s) * np.exp(-s * effect.delay_s)) \
+        + level * simulated[0]
+
+
+def _by_spectra(measured, simulated, learn, rate):
+    """Order, effect and band by averaged spectra; None without enough segments."""
+    x, y = _segments(simulated, learn), _segments(measured, learn)
+    if len(x) < _FEWEST_SEGMENTS:
+        return None
     every = _Response(x, y, rate)
     halves = [(_Response(x[a::2], y[a::2], rate), _Response(x[1 - a::2], y[1 - a::2], rate))
               for a in (0, 1)]
@@ -89,17 +133,94 @@ def fit_empirical_link(measured, simulated, used, held_out, sampling_rate_hz):
         error = sum(other.error(one.fit(*how)) for one, other in halves)
         if error < (_CLEARLY if chosen else 1.0) * best:
             best, chosen = error, how
-    effect = every.fit(*chosen)
-    convolution = Convolution(simulated - simulated[0], rate, abs(effect.delay_s))
-    s = convolution.s
-    level = float(effect.transfer_function(np.zeros(1))[0].real)
-    described = convolution.response(effect.transfer_function(s) * np.exp(-s * effect.delay_s)) \
-        + level * simulated[0]
-    again = float(np.mean((measured - described)[learn]))
-    rows = used & held_out
-    return EmpiricalFit(effect, chosen[0], every.band_hz,
-                        gain((measured - simulated - mean)[rows],
-                             (measured - described - again)[rows]))
+    return chosen[0], every.fit(*chosen), every.band_hz
+
+
+def _by_lags(measured, simulated, learn, rate):
+    """Order, effect and band by least squares over lags; None where no length has enough samples,
+    or none predicts what it was not fitted to."""
+    x, y = (values - float(np.mean(values[learn])) for values in (simulated, measured))
+    blocks, step = Blocks.of(np.where(learn, x, 0.0)), _step(x, y, learn)
+    best, chosen = 1.0, None
+    for span in _LAGS:
+        size = span[1] - span[0] + 1
+        if size * step * _SAMPLES > learn.sum() \
+                or 2 * size * step > blocks.shortest * len(blocks) / FOLDS:
+            break
+        weights, left = Filters([x], [span], blocks, learn, step).learnt(y)
+        if left < (_LONGER**2 if chosen else 1.0) * best:
+            best, chosen = left, (span, weights)
+    if chosen is None:
+        return None
+    return _Lags(x, *chosen, step / rate, 1 / rate).fit(best)
+
+
+def _step(x, y, learn):
+    """Samples of a lag: more than one where both signals are far slower than that."""
+    window, highest = learn * np.hanning(len(x)), 0.0
+    for values in (x, y):
+        energy = np.cumsum(np.abs(rfft(values * window))**2)
+        highest = max(highest, np.searchsorted(energy, _HIGHEST * energy[-1]) / len(x))
+    return int(np.clip(1 / (_FASTER * max(highest, 1e-9)), 1, max(len(x) // _FEWEST, 1)))
+
+
+class _Lags:
+    """A filter of so many samples before and after, and rational ones like it."""
+
+    def __init__(self, x, span, weights, lag_s, interval_s):
+        self.lags_s = np.arange(span[0], span[1] + 1) * lag_s
+        self.weights = weights
+        # what is slower than all of it counts, too
+        self.frequency = np.linspace(0, 0.5 / lag_s, 2 * len(weights))
+        self.frequency[0] = self.frequency[1] / 100
+        self.ratio = np.exp(-2j * np.pi * np.outer(self.frequency, self.lags_s)) @ weights
+        power = np.abs(rfft(x * np.hanning(len(x))))**2
+        edges = (np.r_[0.0, self.frequency] + np.r_[self.frequency, self.frequency[-1]]) / 2
+        edges = np.clip(edges * len(x) * interval_s, 0, len(power) - 1)
+        self.power = np.array([power[int(a):int(b) + 1].mean() for a, b in zip(edges, edges[1:])])
+        self.strong = self.power > _STRONG * self.power.max()
+        self.band_hz = tuple(self.frequency[self.strong][[0, -1]].tolist())
+
+    def delays_s(self):
+        """None, and where the weights begin."""
+        so_far = np.cumsum(self.weights**2)
+        return sorted({0.0, *(float(self.lags_s[np.searchsorted(so_far, share * so_far[-1])])
+                              for share in _BEGINS)}, key=abs)
+
+    def fit(self, left):
+        """Order, effect and band of the smallest order that is about as good as the filter itself,
+        which leaves a share of the power; or as any."""
+        wanted = np.where(self.strong, self.ratio, 1.0)
+        weight = np.sqrt(np.where(self.strong, self.power / self.power.max(), _STRONG))
+        best, chosen = np.inf, None
+        for order, delay_s in itertools.product(_MORE_ORDERS, self.delays_s()):
+            effect = _rational(self.frequency, wanted, weight, order, delay_s, self.band_hz[1],
+                               1 / np.ptp(self.lags_s))
+            error = left + self._apart(effect)
+            if error < (_CLEARLY**2 if chosen else 1.0) * best:
+                best, chosen = error, (order, effect, self.band_hz)
+            if best * _CLEARLY**2 < left:
+                break
+        return chosen
+
+    def _apart(self, effect):
+        """Power by which a filter's output is another one, over the measured power that this one
+        explains."""
+        s = 2j * np.pi * self.frequency
+        apart = self.ratio - effect.transfer_function(s) * np.exp(-s * effect.delay_s)
+        power = self.power * self.strong
+        return float(np.sum(power * np.abs(apart)**2) / np.sum(power * np.abs(self.ratio)**2))
+
+
+def _rational(frequency, wanted, weight, order, delay_s, scale_hz, slowest):
+    """EmpiricalLink of an order and a delay that comes nearest to a response; what it remembers
+    fades by e in 1/slowest [s] at the latest."""
+    u = 1j * frequency / scale_hz
+    numerator, denominator = fit_rational(
+        u, wanted * np.exp(2j * np.pi * frequency * delay_s), weight, order,
+        slowest / (2 * np.pi * scale_hz), _FASTEST * np.abs(u[-1]))
+    return effect_of("empirical_link")(tuple(numerator.tolist()), tuple(denominator.tolist()),
+                                       float(scale_hz), delay_s)
 
 
 def _segments(values, learn):
@@ -127,7 +248,7 @@ class _Response:
         self.ratio = shared / np.maximum(own, 1e-300)
         coherence = np.clip(np.abs(shared)**2 / np.maximum(own * other, 1e-300), 1e-6, 1 - 1e-9)
         variance = np.abs(self.ratio)**2 * (1 - coherence) / (2 * len(x) * coherence)
-        self.strong = own > 1e-6 * own.max()
+        self.strong = own > _STRONG * own.max()
         # what a filter of too low an order does best: what is known best, or is most of the output;
         # no better known than in a hundredth of its spread: leakage is as large
         self.weights = {"known": 1 / np.sqrt(variance + 1e-8),
@@ -165,20 +286,13 @@ class _Response:
             # numerator - wanted (denominator without its leading power) = wanted u^order
             matrix = np.c_[rows * powers, -rows * wanted[:, None] * powers[:, 1:]]
             right = rows[:, 0] * wanted * powers[:, 0]
-            found = _least_squares(matrix, right)
+            found = real_solution(matrix, right)
             denominator = _stable(np.r_[1.0, found[order + 1:]], self.band_hz[0] / scale)
             old = np.abs(powers @ denominator)
         rows = (weight / old)[:, None] * (old / (powers @ denominator))[:, None]
-        numerator = _least_squares(rows * powers, weight * wanted)
+        numerator = real_solution(rows * powers, weight * wanted)
         return effect_of("empirical_link")(tuple(numerator.tolist()), tuple(denominator.tolist()),
                                            float(scale), delay_s)
-
-
-def _least_squares(matrix, right):
-    """Real solution of complex equations."""
-    matrix, right = np.r_[matrix.real, matrix.imag], np.r_[right.real, right.imag]
-    size = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
-    return np.linalg.lstsq(matrix / size, right, rcond=1e-10)[0] / size
 
 
 def _stable(polynomial, slowest):

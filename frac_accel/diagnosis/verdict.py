@@ -46,6 +46,16 @@ _HINT, _MUCH, _UNSEEN = 0.1, 0.3, 0.005
 _OF_MOTION = ("linear", "across", "even", "odd", "time_varying")
 
 
+class Curves(NamedTuple):
+    """Fitted curves beside a model: their effects by cause, their words, the held-out error (RMS)
+    with them, and the output (None without)."""
+
+    effects: dict
+    words: list
+    after: float
+    output: object
+
+
 class Likely(NamedTuple):
     """What the competition of causes has found, with all that a verdict rests on."""
 
@@ -170,21 +180,27 @@ def _described(engine, named, sets):
         verdict = "undecided"
     if not (verdict in _INCOMPLETE or (strange and not plain)):
         return Described(verdict, plain, {}, [], [], named.findings, account.after, None)
-    effects, words, after, output = _by_curves(
-        engine, fitted, account.after, {part for _, part in strange},
-        {f.cause for f in named.findings})
+    named_causes = {f.cause for f in named.findings}
+    described = _by_curves(engine, fitted, account.after, {part for _, part in strange},
+                           named_causes)
     wider, known = None, {}
     for each in {each.causes: each for each in sets}.values():
-        found = _kept(engine, named, each, after)
-        if found is not None:
-            wider, known, after = found
-            output = wider.output
+        found = _kept(engine, named, each, account.after)
+        if found is None:
+            continue
+        fit, stds, error = found
+        with_it = _by_curves(engine, fit, error, {part for _, part in engine.structure(fit)},
+                             named_causes)
+        if with_it.after <= _CLEARLY * described.after:
+            wider, known, described = fit, stds, with_it
+    effects, words, after, output = described
     if wider is None:
         return Described(verdict, plain, effects, words, [], named.findings, after, output)
     # named causes are what they are in the model that is written
     findings = [_as_kept(f, wider.effects, known) for f in named.findings]
-    return Described(verdict, plain, wider.effects, [],
-                     sorted(wider.effects.keys() - fitted.causes), findings, after, output)
+    return Described(verdict, plain, {**wider.effects, **effects}, words,
+                     sorted(wider.effects.keys() - fitted.causes), findings, after,
+                     wider.output if output is None else output)
 
 
 def _taken_back(engine, likely, named, described):
@@ -350,8 +366,8 @@ def _account(engine, fitted, findings, noise):
 
 
 def _by_curves(engine, fitted, after, parts, named):
-    """What stands for what no cause explains, by cause, with a constant that has no name as it is
-    beside it; its words, the held-out error, and the output with it (None without).
+    """`Curves` that stand for what no cause explains, with a constant that has no name as it is
+    beside them.
 
     A fitted course of the zero where a part of it is slow, a fitted filter where one is linear, and
     a fitted curve where one is even or odd.
@@ -384,9 +400,9 @@ def _by_curves(engine, fitted, after, parts, named):
         if found.is_worth_it and error < after:
             effects, output, after = more, simulated, error
             described.append(words)
-    return ({cause: effect for cause, effect in effects.items()
-             if effect is not fitted.effects.get(cause)}, described, after,
-            output if described else None)
+    return Curves({cause: effect for cause, effect in effects.items()
+                   if effect is not fitted.effects.get(cause)}, described, after,
+                  output if described else None)
 
 
 def _kept(engine, named, widest, after):
@@ -448,7 +464,7 @@ def _as_kept(finding, kept, known):
 def _ahead(problem, effects, named):
     """Words where a model, by a lead that nothing names, answers before the reference moves though
     no stamp shows that to be late."""
-    delays = {cause: effect.pure_delay_s() for cause, effect in effects.items()
+    delays = {cause: effect.slow_delay_s() for cause, effect in effects.items()
               if not effect.of_reference}
     if problem.record.is_reference_late or not any(
             delay < 0 and cause not in named for cause, delay in delays.items()):

@@ -104,11 +104,12 @@ def description_words(described, unnamed, kept, left):
     if unnamed:
         parts.append(f"keeps {listed(unnamed)} without a name")
     if kept:
-        describe, are, them = (("describes", "is", "it") if len(kept) == 1 else
-                               ("describe", "are", "them"))
-        parts.append(f"keeps {listed(kept)}, which {describe} a part of it and {are} not named: "
-                     f"{_percent(left)} of the output is left with {them}")
-    return "; the extended model " + "; it ".join(parts) if parts else ""
+        describe, are = ("describes", "is") if len(kept) == 1 else ("describe", "are")
+        parts.append(f"keeps {listed(kept)}, which {describe} a part of it and {are} not named")
+    if not parts:
+        return ""
+    return "; the extended model " + "; it ".join(parts) + (
+        f": {_percent(left)} of the output is left with that model" if described or kept else "")
 
 
 def hint_words(share):

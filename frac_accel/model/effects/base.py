@@ -358,6 +358,10 @@ class Effect:
         """Time [s] by which this effect moves the signal as it is."""
         return 0.0
 
+    def slow_delay_s(self):
+        """Time [s] by which motion far slower than the effect is late."""
+        return self.pure_delay_s()
+
     def clock_ratio(self):
         """Time that passes while the stamps advance by one second."""
         return 1.0

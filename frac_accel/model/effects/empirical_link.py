@@ -32,7 +32,7 @@ class EmpiricalLink(Effect):
     numerator: tuple = coefficients()
     denominator: tuple = coefficients()
     frequency_hz: float = parameter("Hz", above=0)
-    delay_s: float = parameter("s", minimum=-10, maximum=10, default=0.0)
+    delay_s: float = parameter("s", minimum=-3600, maximum=3600, default=0.0)
 
     def __post_init__(self):
         if not self.denominator[0] or not any(self.numerator):
@@ -48,6 +48,15 @@ class EmpiricalLink(Effect):
 
     def pure_delay_s(self):
         return self.delay_s
+
+    def slow_delay_s(self):
+        # - d arg H / ds at s = 0
+        (b1, b0), (a1, a0) = (tuple((0.0, *values)[-2:])
+                              for values in (self.numerator, self.denominator))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            own = np.subtract(np.divide(a1, a0), np.divide(b1, b0))
+        return self.delay_s + (float(own) / (2 * np.pi * self.frequency_hz)
+                               if np.isfinite(own) else 0.0)
 
     def transfer_function(self, s):
         u = np.asarray(s, complex) / (2 * np.pi * self.frequency_hz)
