@@ -14,9 +14,10 @@ oldest := .venv-oldest
 docs := .venv-docs
 python := $(venv)/bin/python
 numerical := -m pytest -n 2
-# What no numerical library's age can change: packages, pages, nodes, workers and the command line.
-not_numerical := $(addprefix --ignore=test/,package report nodes fleet/test_local_cores.py \
-    commands/test_command_line.py)
+# What no numerical library's age can change: packages, pages, nodes, workers and the command line;
+# and most searches, of which those of the commands are enough.
+not_numerical := $(addprefix --ignore=test/,package report nodes diagnosis \
+    fleet/test_local_cores.py commands/test_command_line.py)
 # What an installer says is kept, and shown only where it fails.
 quietly = > $(venv)/install.log 2>&1 || { cat $(venv)/install.log; exit 1; }
 

@@ -136,7 +136,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
         for cause, rms in takes.items():
             like = best.effects[cause].kindred(best.residual, p.time)
             strange = math.sqrt(max(unexplained**2 - like**2, 0.0))
-            if rms < WEIGHS * strange and not engine.stands_alone(best, cause, rms):
+            if rms < WEIGHS * strange and not engine.stands_among_slow(best, cause, rms):
                 doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) does not stand out of "
                                          f"what is left unexplained ({strange:.3g} RMS)")
     if words := most_is_left(engine, left, noise):
@@ -438,7 +438,7 @@ def _corrections(engine, best, takes):
             ({cause for cause in filters if cause in takes},
              lambda cause: filters[cause].pure_delay_s() or filters[cause].restates_core),
             (takes, lambda cause: not best.effects[cause].everyday
-             and not engine.stands_alone(best, cause, takes[cause]))):
+             and not engine.stands_among_slow(best, cause, takes[cause]))):
         large = max(among, key=takes.get, default=None)
         found |= {cause: f"it takes {takes[cause]:.3g} RMS only beside {large} "
                          f"({takes[large]:.3g} RMS): it may mend what that lacks"

@@ -4,7 +4,7 @@ import dataclasses
 import functools
 
 import numpy as np
-from scipy.fft import rfft
+from scipy.fft import dct, rfft
 from scipy.ndimage import uniform_filter1d
 
 from ..budget import Division, established_noise
@@ -64,6 +64,8 @@ _CORE = 0.005
 _SAME = 1.0
 # Times what is left where it acts that a cause must take (RMS) to stand alone there.
 _ALONE = 10.0
+# Share of the power that a slow zero adds by whose frequencies it counts, and their share of all.
+_NEARLY_ALL, _FEW_LINES = 0.99, 0.02
 # Share of the residual's power for which a coarse lattice must account.
 _COARSE = 0.2
 # RMS of the error of the model in use where it is judged, over that before, below which it errs
@@ -319,13 +321,20 @@ class Engine:
         """Sets without a cause, no larger than the best, by score; (margin, causes)."""
         if self.comparing(cause) is not self:
             return self.part.rivals(self.part.best, cause)
-        variance = best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
+        variance = best.cost / self.margin_of_all(best, cause)
         found = [(self._margin(fit, best, variance), fit.causes) for fit in
                  self.search.fits.values()
                  if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
         # a hollow one that is close says the same in other words
         return [entry for entry in sorted(found, key=lambda entry: entry[0])
                 if entry[0] > _CLOSE or not self.hollow(self.search.fits[entry[1]])]
+
+    def margin_of_all(self, best, cause):
+        """Margin by which a set is ahead of one that leaves twice the power: as many variances of
+        the noise, where that is densest in frequency, as the record has samples that count."""
+        engine = self.comparing(cause)
+        fitted = best if engine is self else engine.best
+        return engine.problem.count / noise_peak(fitted.residual, engine.problem.used)
 
     def _margin(self, rival, best, variance):
         """Variances of the noise by which a set is ahead of its rival; no lead of a rival that has
@@ -509,6 +518,20 @@ class Engine:
         is left elsewhere."""
         beside = fitted.effects[cause].beside(fitted.residual, self.problem.time)
         return beside is not None and taken > _ALONE * beside
+
+    def stands_among_slow(self, fitted, cause, taken):
+        """The same, or whether what a cause takes of a slow zero stands far out of what is left
+        that is as slow; another law of the zero may do the same."""
+        if self.stands_alone(fitted, cause, taken):
+            return True
+        if not fitted.effects[cause].adds:
+            return False
+        lines = dct(self.added(fitted, cause), norm="ortho")[1:]**2
+        count = 1 + int(np.searchsorted(np.cumsum(lines), _NEARLY_ALL * lines.sum()))
+        if not lines.any() or count > _FEW_LINES * len(lines):
+            return False
+        slow = dct(fitted.residual, norm="ortho")[1:1 + count]
+        return taken > _ALONE * np.linalg.norm(slow) / np.sqrt(self.problem.count)
 
     def rms(self, values):
         """RMS of values where samples count."""
@@ -698,6 +721,15 @@ class Engine:
         own = self._no_fault(fitted)
         return dataclasses.replace(found, linear=max(found.linear - own, 0.0),
                                    level=max(found.level - own, 0.0))
+
+    def left_beside_noise(self, fitted):
+        """The same, where noise may grow with the motion: what comes and goes with that, and
+        nothing predicts, bends no cause that is found."""
+        found = self.left(fitted)
+        predicted = [entry for entry in self.budget(fitted, self.silent).parts
+                     if entry["part"] != "noise" and entry["share"] > _OF_NOISE.get(
+                         entry["part"], _PART)]
+        return found if predicted else dataclasses.replace(found, level_score=0.0)
 
     def _leftover(self, fitted, residual, across):
         return leftover(residual, fitted.simulated, self.problem.used, across,

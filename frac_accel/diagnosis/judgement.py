@@ -69,10 +69,11 @@ def judge(engine, best, found, shown, noise_std=None):
         alone = engine.stands_alone(best, cause, g.taken)
         margin, other = (np.inf, frozenset()) if alone or not rivals else rivals[0]
         instead = sorted(other - best.causes)
-        count = engine.comparing(cause).problem.count
-        clear = max(_CLEAR, nearly * count)
+        of_all = engine.margin_of_all(best, cause)
+        clear = max(_CLEAR, nearly * of_all)
         if any(effect_of(name).needs_temperature for name in instead):
-            clear = max(clear, _AS_MEASURED * g.taken**2 * count * engine.problem.count / best.cost)
+            clear = max(clear, _AS_MEASURED * g.taken**2 * of_all * engine.problem.count
+                        / best.cost)
         entry = Finding(best.effects[cause], stds[cause],
                         certainty(g) if alone else confidence(margin * _CLEAR / clear),
                         [*(instead if margin < 10 * _CLEAR else []), *([mirror] if mirror else [])],
@@ -201,7 +202,7 @@ def _examined(engine, best, noise_std, known):
     if turned is not best:
         best, gains = _relevant(engine, turned, known)
     best = engine.search.to_its_best(best)
-    left = engine.left(best)
+    left = engine.left_beside_noise(best)
     noise = engine.established_noise(best, noise_std)
     stds = engine.uncertainties(best)
     judged = {cause: g for cause, g in gains.items() if cause not in known}

@@ -52,7 +52,7 @@ def sure(engine, best, findings, tied, left, fraction):
     if left.share > 0:
         # something is left, which the causes may have been bent by, or mistaken for
         doubtful = {f.cause for f in findings if f.cause in best.effects
-                    and not engine.stands_alone(best, f.cause, f.gain.taken)
+                    and not engine.stands_among_slow(best, f.cause, f.gain.taken)
                     and (fraction > _LEFT or engine.unsteadiness(best, f.cause) > _STEADY)}
     fitted, stds, dropped = refitted(engine, best, {f.cause for f in findings} - doubtful, tied)
     findings = [f for f in findings if f.cause not in doubtful and f.cause not in dropped]
@@ -100,7 +100,7 @@ def _with_identified(engine, best, fitted, stds):
 def _are_minor(engine, best, missing, named):
     """Whether causes without a name take little beside each named one of a set that leaves nothing
     that stands out: what they stand for is no reason to doubt the others."""
-    if engine.left(best).share > 0 or engine.structure(best):
+    if engine.left_beside_noise(best).share > 0 or engine.structure(best):
         return False
     least = min(engine.takes(best, cause) for cause in named)
     return all(engine.takes(best, cause)
@@ -134,7 +134,7 @@ def refitted(engine, best, named, tied):
                 {c: e for c, e in best.effects.items() if c in named | constant or c in base}))
             stds = engine.uncertainties(fitted)
             takes = {c: engine.rms(engine.added(fitted, c)) for c in named & fitted.causes}
-            found = {**by_what_is_left(engine, fitted, takes, engine.left(fitted)),
+            found = {**by_what_is_left(engine, fitted, takes, engine.left_beside_noise(fitted)),
                      **left_open(engine, fitted, stds, takes),
                      **{c: "without what is only suspected its parameters are others"
                         for c in takes if not engine.agrees(best, known, [c], fitted, _OTHERS)},

@@ -9,10 +9,10 @@ from ..errors import FracAccelError
 from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.core import Oscillator
-from ..model.effects import fault_of_reference
+from ..model.effects import fault_of_reference, known_effects
 from . import courses
 from .doubts import delay_of_unseen_core, left_open, most_is_left, own_delay_s
-from .empirical import fit_empirical_link
+from .empirical import EmpiricalFit, fit_empirical_link
 from .empirical_map import fit_empirical_map
 from .evidence import Evidence
 from .finding import Diagnosis
@@ -38,6 +38,8 @@ _INCOMPLETE = ("unexplained", "partly_explained")
 _CLEARLY = 0.9
 # Times as much of the held-out data (RMS) as the model in use leaves, that names must not leave.
 _MISLED = 1.1
+# Share of an axis at which a fit begins.
+_ACROSS = 1e-3
 # Share of what is left (power) that may be no noise in a record that counts as consistent, where so
 # little is left that it need not be noise; more of it where that is such a share of the output
 # (RMS) at most.
@@ -369,25 +371,27 @@ def _by_curves(engine, fitted, after, parts, named):
     """`Curves` that stand for what no cause explains, with a constant that has no name as it is
     beside them.
 
-    A fitted course of the zero where a part of it is slow, a fitted filter where one is linear, and
-    a fitted curve where one is even or odd.
+    A fitted course of the zero where a part of it is slow, a share of each other axis where one
+    comes across, a fitted filter where one is linear, and a fitted curve where one is even or odd.
     """
     p, described = engine.problem, []
     rest, effects, output = engine.held_out_rows, fitted.effects, fitted.output
     constants = constants_of(effects) - engine.search.base.keys() - named
     for belongs, words, fit in (
-            ({"slow"}, "a fitted course of the zero", lambda output: courses.fit_empirical_zero(
+            ({"slow"}, "a fitted course of the zero", lambda _, output: courses.fit_empirical_zero(
                 p, output, rest)),
-            ({"linear"}, "a fitted filter", lambda output: fit_empirical_link(
+            ({"across"}, "a fitted share of each other axis", lambda effects, output:
+             _fit_across(p, effects, output, rest)),
+            ({"linear"}, "a fitted filter", lambda _, output: fit_empirical_link(
                 p.measured, output, p.used, rest, p.rate)),
-            ({"even", "odd"}, "a fitted curve", lambda output: fit_empirical_map(
+            ({"even", "odd"}, "a fitted curve", lambda _, output: fit_empirical_map(
                 p.measured, output, p.used, rest))):
         # whatever the time limit: it takes a fraction of a second, and a search that was cut needs
         # it most
         if not belongs & parts:
             continue
         try:
-            found = fit(output)
+            found = fit(effects, output)
             if found.effect.cause in effects:
                 continue
             more = {**effects, found.effect.cause: found.effect}
@@ -403,6 +407,21 @@ def _by_curves(engine, fitted, after, parts, named):
     return Curves({cause: effect for cause, effect in effects.items()
                    if effect is not fitted.effects.get(cause)}, described, after,
                   output if described else None)
+
+
+def _fit_across(p, effects, output, rest):
+    """`EmpiricalFit` of what the other axes add to an output, learnt on all but the rows that are
+    held out."""
+    cls, = (cls for cls in known_effects().values() if cls.describes == "across")
+    others = cls.fitted_parameters(AXES[p.axis], p.excited)
+    if not others or any(effect.stage == cls.stage for effect in effects.values()):
+        raise FracAccelError("nothing more can come across")
+    learning = p.restricted(p.used & ~rest)
+    start = cls(**dict.fromkeys(others, _ACROSS))
+    effect = learning.fit({**effects, cls.cause: start}, held=effects).effects[cls.cause]
+    described = p.simulate({**effects, cls.cause: effect})
+    return EmpiricalFit(effect, len(others), None,
+                        gain((p.measured - output)[rest], (p.measured - described)[rest]))
 
 
 def _kept(engine, named, widest, after):

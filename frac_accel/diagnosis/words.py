@@ -100,7 +100,9 @@ def description_words(described, unnamed, kept, left):
     were identified with it, and those that are only suspected, with what they leave."""
     parts = []
     if described:
-        parts.append(f"has {listed(described)}, which describes a part of it and names nothing")
+        parts.append(f"has {listed(described)}, which " + (
+            "describes a part of it and names nothing" if len(described) == 1 else
+            "describe a part of it and name nothing"))
     if unnamed:
         parts.append(f"keeps {listed(unnamed)} without a name")
     if kept:

@@ -16,14 +16,13 @@ _LENGTH = 16384
 _LACKING = 2.0
 # Residual of the exchanged pair, of that of the pair, from which on its shape alone is decisive;
 # the same where the delays are on its side too; and its residual, of its output, that a sensor
-# may have there and where the pair itself has no model.
+# may have there.
 _SHAPE = 0.25
 _SHAPE_AND_DELAY = 0.4
 _SENSOR = 0.15
 # Largest damping ratio of a resonance that shows as a peak, with a margin: the inverse of a
 # well damped sensor may also be a link with a lead.
 _PEAK = 0.6
-_ALONE = 0.5
 # Samples by which a delay must be negative beyond its uncertainty, and by which it is worth
 # telling; relative standard uncertainty of what is known.
 _SAMPLES = 0.1
@@ -146,8 +145,7 @@ def _exchanged(forward, reference, sensor, pair):
     if backward is None or not backward.determined:
         return None
     if forward is None:
-        return _error("no sensor answers like this", backward) \
-            if backward.unexplained < _ALONE else None
+        return _error("no sensor answers like this", backward) if backward.is_sensor else None
     ratio = backward.unexplained / forward.unexplained
     decisive = ratio < _SHAPE or (ratio < _SHAPE_AND_DELAY and forward.early and backward.causal)
     if not backward.is_sensor or not decisive:

@@ -139,6 +139,8 @@ class Effect:
     acts_on_slow_motion: ClassVar[bool] = False
     # True for what is so common and so cheap to fit that every search begins with it, too
     everyday: ClassVar[bool] = False
+    # part of what a model leaves that it describes where no cause explains it
+    describes: ClassVar[str | None] = None
     # parameters to which what it adds to the output is in proportion, where it only adds
     adds: ClassVar[tuple[str, ...]] = ()
     # name among the parameters that `identify` finds beside a core

@@ -22,6 +22,7 @@ class CrossAxisSensitivity(Effect):
     explanation = "The sensor also answers to motion across its axis."
     experiment = ("Move in one direction across the axis at a time, with the axis itself at rest: "
                   "what it still shows came across.")
+    describes = "across"
 
     x: float = parameter("1", minimum=-1, maximum=1, default=0.0, scale=1.0, null=0.0)
     y: float = parameter("1", minimum=-1, maximum=1, default=0.0, scale=1.0, null=0.0)

@@ -1,0 +1,76 @@
+"""Names beside noise that grows with the motion, that is coloured, or that is no noise at all."""
+
+import numpy as np
+import pytest
+from sampled_pair import sampled_pair
+from scipy.signal import butter, lfilter, sosfilt, sosfiltfilt
+
+from frac_accel import diagnose
+from frac_accel.model import SensorModel
+from frac_accel.model.core import Gain
+
+RATE, FINER, COUNT = 200.0, 8, 12_000
+
+
+def motion_of(rng, band=(0.5, 40.0)):
+    """Base acceleration with an RMS of one, as finely sampled, louder and quieter by turns."""
+    fine = FINER * RATE
+    motion = sosfiltfilt(butter(3, band, "band", fs=fine, output="sos"),
+                         rng.normal(size=FINER * COUNT))
+    level = 1 + 0.8 * np.sin(2 * np.pi * np.arange(len(motion)) / (fine * rng.uniform(6, 12)))
+    motion *= level
+    return motion / motion.std()
+
+
+def named(record, **given):
+    found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60, **given)
+    return {finding.cause: finding for finding in found.findings}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_zero_that_follows_temperature_beside_noise_that_grows_with_the_motion(seed):
+    rng = np.random.default_rng([51, seed])
+    motion = motion_of(rng)
+    seconds = np.arange(COUNT / RATE)
+    celsius = 25 + 6 * np.sin(2 * np.pi * seconds / rng.uniform(25, 40))
+    per_k = rng.uniform(0.03, 0.05)
+    zero = per_k * np.interp(np.arange(len(motion)) / (FINER * RATE), seconds, celsius - 25)
+    noise = 0.06 * motion * rng.normal(size=len(motion))
+    record = sampled_pair(rng, (motion, motion + zero + noise), FINER, RATE, 1e-3)
+    found = named(record, temperature=(np.round(1e9 * seconds).astype(np.int64), celsius))
+    assert found.keys() == {"thermal_offset"}
+    value, std = found["thermal_offset"].effect.coefficient_per_k, \
+        found["thermal_offset"].std["coefficient_per_k"]
+    assert abs(value - per_k) < 4 * std < 0.1 * per_k
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_moving_average_beside_coloured_noise(seed):
+    """A low-pass alone leaves 2.5 times the power, and was as likely."""
+    rng = np.random.default_rng([52, seed])
+    motion = motion_of(rng, (1.0, 70.0))
+    # by the trapezoidal rule
+    taps = np.r_[0.5, np.ones(rng.integers(2 * FINER, 3 * FINER)), 0.5]
+    sensor = motion
+    for _ in range(3):
+        sensor = lfilter(taps / taps.sum(), 1.0, sensor)
+    wander = sosfilt(butter(1, [0.05, 1.0], "band", fs=FINER * RATE, output="sos"),
+                     rng.normal(size=len(motion)))
+    sensor = sensor + 0.1 * sensor.std() * wander / wander.std()
+    found = named(sampled_pair(rng, (motion, sensor), FINER, RATE, 1e-3))
+    assert found.keys() == {"linear_phase_filter"}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_step_of_the_zero_beside_a_delay_that_moves(seed):
+    """No cause has a delay that grows and is flushed, again and again."""
+    rng = np.random.default_rng([53, seed])
+    motion = motion_of(rng, (1.0, 25.0))
+    time = np.arange(len(motion))
+    late = 12 * ((time / (FINER * RATE * rng.uniform(8, 12))) % 1)
+    sensor = np.interp(time - late, time, motion)
+    at, step = rng.uniform(0.3, 0.7), rng.choice([-1, 1]) * rng.uniform(0.8, 1.6)
+    sensor[int(at * len(sensor)):] += step
+    found = named(sampled_pair(rng, (motion, sensor), FINER, RATE, 1e-3))
+    assert found.keys() == {"offset_step"}
+    assert found["offset_step"].effect.step == pytest.approx(step, rel=0.03)
