@@ -37,6 +37,8 @@ _REPEATED = 0.5
 _AS_GOOD = 0.5
 # Samples around a missing one in which a filter still answers to what was put in its place.
 _AROUND_MISSING = 10
+# Uncertain share of what the filter to a band has taken of their RMS.
+_OF_FILTER = 0.25
 _PASSES = 60
 _WINDOW = 5
 
@@ -82,18 +84,27 @@ class InterferenceBursts(Effect):
                 or _repeated(seen.measured[used], inside) > _REPEATED:
             return None
         length = inside.sum() / len(starts)
-        rms = float(np.sqrt(loud - noise))
-        stds = {"share": float(np.sqrt(share * (1 - share) * max(2 * length, 1) / len(error))),
-                "rms": rms / np.sqrt(2 * share * len(error)) * loud / (loud - noise)}
         after = np.where(inside, error * np.sqrt(noise / loud), error)
         drowned = np.zeros(len(used), bool)
         # its ends are too short for the power of neighbours
         drowned[used] = np.convolve(inside, np.ones(_WINDOW), "same") > 0.5
-        return cls(float(share), rms), Reading(stds, error, after, (
-            f"{len(starts)} bursts of {length:.3g} samples on average, "
-            f"{np.sqrt(loud / noise):.3g} times as loud as the rest, whatever the motion does"),
-            drowned, evident=seen.parts().keys() == {"bursts"}
-            and _apart_from_motion(inside, output, length))
+        words = (f"{len(starts)} bursts of {length:.3g} samples on average, "
+                 f"{np.sqrt(loud / noise):.3g} times as loud as the rest, whatever the motion does")
+        count, rms, taken = len(error), float(np.sqrt(loud - noise)), 0.0
+        if seen.record.band_hz is not None:
+            # a filter takes of their power, and makes them longer
+            values, simulated, _ = seen.as_recorded()
+            found = _two_noises(values - simulated)
+            if 0 < found[2] <= share and found[1] > loud:
+                (noise, loud, share, _), count = found, len(values)
+                taken, rms = float(np.sqrt(loud - noise)) - rms, float(np.sqrt(loud - noise))
+        std = rms / np.sqrt(2 * share * count) * loud / (loud - noise)
+        stds = {"share": float(np.sqrt(share * (1 - share) * max(2 * length, 1) / count)),
+                "rms": float(np.hypot(std, _OF_FILTER * taken))}
+        alone = seen.parts().keys() == {"bursts"}
+        return cls(float(share), rms), Reading(
+            stds, error, after, words, drowned,
+            evident=alone and _apart_from_motion(inside, output, length))
 
 
 def _near(missing):
