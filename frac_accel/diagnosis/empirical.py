@@ -12,10 +12,9 @@ from ..errors import FracAccelError
 from ..model.effects import effect_of
 from ..signals.convolution import Convolution
 from .gain import Gain, gain
-from .rational import fit_rational, real_solution
+from .rational import fit_rational
 
-_ORDERS = (1, 2, 3, 4, 6)
-_MORE_ORDERS = (1, 2, 3, 4, 6, 8, 12, 16)
+_ORDERS = (1, 2, 3, 4, 6, 8, 12, 16)
 # Lags of the filters, the first and the last; samples for each of them; where the power of both
 # signals ends, lags in a cycle there, and the fewest samples that are left.
 _LAGS = ((-4, 8), (-16, 32), (-48, 96), (-96, 192))
@@ -25,12 +24,10 @@ _HIGHEST, _FASTER, _FEWEST = 0.999, 4, 1000
 # it is known.
 _BEGINS = (1e-4, 1e-2)
 _STRONG = 1e-6
-# Size of a pole over the highest frequency.
-_FASTEST = 4.0
+# Size of a pole over the highest frequency, and its least damping over the highest of the band.
+_FASTEST, _LEAST_DAMPING = 4.0, 1e-4
 _LONGEST_SEGMENT, _SHORTEST_SEGMENT = 4096, 32
 _FEWEST_SEGMENTS = 8
-# Reweighted linear fits, which converge within a few.
-_PASSES = 12
 # A larger order must bring the error on the other segments below this share.
 _CLEARLY = 0.9
 # And so must weights over more samples than those that are known.
@@ -192,10 +189,10 @@ class _Lags:
         which leaves a share of the power; or as any."""
         wanted = np.where(self.strong, self.ratio, 1.0)
         weight = np.sqrt(np.where(self.strong, self.power / self.power.max(), _STRONG))
-        best, chosen = np.inf, None
-        for order, delay_s in itertools.product(_MORE_ORDERS, self.delays_s()):
-            effect = _rational(self.frequency, wanted, weight, order, delay_s, self.band_hz[1],
-                               1 / np.ptp(self.lags_s))
+        best, chosen, fades_hz = np.inf, None, 1 / (2 * np.pi * np.ptp(self.lags_s))
+        for order, delay_s in itertools.product(_ORDERS, self.delays_s()):
+            effect = _rational(self.frequency, wanted, weight, order, delay_s,
+                               (fades_hz, self.band_hz[1]), fades_hz)
             error = left + self._apart(effect)
             if error < (_CLEARLY**2 if chosen else 1.0) * best:
                 best, chosen = error, (order, effect, self.band_hz)
@@ -212,15 +209,14 @@ class _Lags:
         return float(np.sum(power * np.abs(apart)**2) / np.sum(power * np.abs(self.ratio)**2))
 
 
-def _rational(frequency, wanted, weight, order, delay_s, scale_hz, slowest):
-    """EmpiricalLink of an order and a delay that comes nearest to a response; what it remembers
-    fades by e in 1/slowest [s] at the latest."""
-    u = 1j * frequency / scale_hz
+def _rational(frequency, wanted, weight, order, delay_s, band_hz, least_damping_hz):
+    """EmpiricalLink of an order and a delay that comes nearest to a response."""
+    scale = band_hz[1]
     numerator, denominator = fit_rational(
-        u, wanted * np.exp(2j * np.pi * frequency * delay_s), weight, order,
-        slowest / (2 * np.pi * scale_hz), _FASTEST * np.abs(u[-1]))
+        1j * frequency / scale, wanted * np.exp(2j * np.pi * frequency * delay_s), weight, order,
+        least_damping_hz / scale, (band_hz[0] / scale, _FASTEST * frequency[-1] / scale))
     return effect_of("empirical_link")(tuple(numerator.tolist()), tuple(denominator.tolist()),
-                                       float(scale_hz), delay_s)
+                                       float(scale), delay_s)
 
 
 def _segments(values, learn):
@@ -272,33 +268,7 @@ class _Response:
     def fit(self, order, delay_s, weight):
         """EmpiricalLink of an order, best where the response is `known` best, or where the motion
         is `loud`."""
-        scale = self.band_hz[1]
-        u = 1j * self.frequency / scale
-        wanted = self.ratio * np.exp(2j * np.pi * self.frequency * delay_s)
         # where nothing is known: about one
-        weight = np.where(self.strong, self.weights[weight], 1.0)
-        wanted = np.where(self.strong, wanted, 1.0)
-        powers = u[:, None]**np.arange(order, -1, -1)
-        denominator = np.r_[1.0, np.zeros(order)]
-        old = np.ones(len(u))
-        for _ in range(_PASSES):
-            rows = (weight / old)[:, None]
-            # numerator - wanted (denominator without its leading power) = wanted u^order
-            matrix = np.c_[rows * powers, -rows * wanted[:, None] * powers[:, 1:]]
-            right = rows[:, 0] * wanted * powers[:, 0]
-            found = real_solution(matrix, right)
-            denominator = _stable(np.r_[1.0, found[order + 1:]], self.band_hz[0] / scale)
-            old = np.abs(powers @ denominator)
-        rows = (weight / old)[:, None] * (old / (powers @ denominator))[:, None]
-        numerator = real_solution(rows * powers, weight * wanted)
-        return effect_of("empirical_link")(tuple(numerator.tolist()), tuple(denominator.tolist()),
-                                           float(scale), delay_s)
-
-
-def _stable(polynomial, slowest):
-    """The polynomial with roots right of the imaginary axis mirrored to the left, none slower than
-    what was seen: a level that only such a one has is reached long after the record has begun."""
-    roots = np.roots(polynomial)
-    roots = roots * np.maximum(slowest / np.maximum(np.abs(roots), 1e-300), 1.0)
-    roots = -np.maximum(np.abs(roots.real), 1e-4) + 1j * roots.imag
-    return np.real(np.poly(roots)) if len(roots) else polynomial
+        return _rational(self.frequency, np.where(self.strong, self.ratio, 1.0),
+                         np.where(self.strong, self.weights[weight], 1.0), order, delay_s,
+                         self.band_hz, _LEAST_DAMPING * self.band_hz[1])

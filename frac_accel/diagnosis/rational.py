@@ -12,7 +12,7 @@ _NOTHING = 1e-11
 _REAL = 1e-9
 
 
-def fit_rational(s, response, weight, order, slowest, fastest):
+def fit_rational(s, response, weight, order, least_damping, sizes):
     r"""Poles and coefficients of :math:`d + \sum_i c_i / (s - p_i)`, stable and real.
 
     Vector fitting (B. Gustavsen, A. Semlyen, *IEEE Trans. Power Delivery* 14 (1999) 1052-1061):
@@ -27,20 +27,22 @@ def fit_rational(s, response, weight, order, slowest, fastest):
     weight : ndarray, shape (n,)
     order : int
         Number of poles.
-    slowest, fastest : float
-        Real parts are at most minus the first, sizes at most the second, in units of `s`.
+    least_damping : float
+        Real parts are at most minus this, in units of `s`.
+    sizes : (float, float)
+        Least and largest size of a pole, in units of `s`.
 
     Returns
     -------
     numerator, denominator : ndarray, shape (order + 1,)
         Of polynomials in s, the highest power first.
     """
-    poles = _starts(np.abs(s).min(), min(np.abs(s).max(), fastest), order)
+    poles = _starts(np.abs(s).min(), min(np.abs(s).max(), sizes[1]), order)
     for _ in range(_PASSES):
         parts = _parts(s, poles)
         every = np.c_[parts, np.ones(len(s)), -response[:, None] * parts]
         found = real_solution(every * weight[:, None], response * weight)
-        poles = _in_order(_within(_zeros(poles, found[order + 1:]), slowest, fastest))
+        poles = _in_order(_within(_zeros(poles, found[order + 1:]), least_damping, sizes))
     parts = np.c_[_parts(s, poles), np.ones(len(s))]
     return _polynomials(poles, real_solution(parts * weight[:, None], response * weight))
 
@@ -60,10 +62,12 @@ def _starts(lowest, highest, order):
     return np.r_[alone, np.stack(pairs, axis=1).ravel()].astype(complex)
 
 
-def _within(poles, slowest, fastest):
-    """Stable poles, none that fades more slowly or is faster than what was seen."""
-    poles = poles * np.minimum(1.0, fastest / np.maximum(np.abs(poles), 1e-300))
-    return -np.maximum(np.abs(poles.real), slowest) + 1j * poles.imag
+def _within(poles, least_damping, sizes):
+    """Stable poles, none slower or faster than what was seen: a level that only a slow one has is
+    reached long after the record has begun."""
+    size = np.maximum(np.abs(poles), 1e-300)
+    poles = poles * np.clip(size, *sizes) / size
+    return -np.maximum(np.abs(poles.real), least_damping) + 1j * poles.imag
 
 
 def _in_order(poles):

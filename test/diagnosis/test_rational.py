@@ -21,7 +21,7 @@ def test_a_rational_function_is_found_again(seed):
     numerator = rng.normal(size=len(poles) + 1)
     s = 1j * np.linspace(0.005, 1, 300)
     response = np.polyval(numerator, s) / np.polyval(np.real(np.poly(poles)), s)
-    found = fit_rational(s, response, np.ones(len(s)), len(poles), 1e-3, 4.0)
+    found = fit_rational(s, response, np.ones(len(s)), len(poles), 1e-3, (1e-3, 4.0))
     again = np.polyval(found[0], s) / np.polyval(found[1], s)
     assert np.max(np.abs(again - response)) < 1e-6 * np.max(np.abs(response))
 
@@ -32,7 +32,7 @@ def test_a_response_of_no_stable_filter_gets_one(order):
     rng = np.random.default_rng(order)
     s = 1j * np.linspace(0.005, 1, 200)
     response = np.exp(3 * s) + 0.1 * rng.normal(size=(200, 2)) @ [1, 1j]
-    numerator, denominator = fit_rational(s, response, np.ones(200), order, 0.01, 4.0)
+    numerator, denominator = fit_rational(s, response, np.ones(200), order, 0.01, (0.01, 4.0))
     poles = np.roots(denominator)
     assert len(numerator) == len(denominator) == order + 1
     assert np.all(np.isreal(numerator)) and np.all(np.isreal(denominator))

@@ -84,8 +84,8 @@ def test_bursts_keep_what_a_filter_to_a_band_takes(seed):
     findings = {f.cause: f for f in diagnose(
         (samples(finer, sine.acceleration(finer)), samples(t, values)), model(), "x").findings}
     assert set(findings) == {"interference_bursts"}
-    rms, std = findings["interference_bursts"].effect.rms, findings["interference_bursts"].std["rms"]
-    assert abs(rms - 0.3) < 3 * std < 0.1
+    finding = findings["interference_bursts"]
+    assert abs(finding.effect.rms - 0.3) < 3 * finding.std["rms"] < 0.1
 
 
 @pytest.mark.parametrize("seed", range(3))
