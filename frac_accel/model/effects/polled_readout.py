@@ -154,7 +154,9 @@ class Beat(NamedTuple):
             if taken > explained and abs(abs(steady.height) - height) < _ALIKE * height:
                 beat, wanders, words = steady.frequency, steady.frequency_std, steady.words
                 added, explained = steady.added, taken
-                height, height_std = abs(steady.height), steady.height_std
+                # a phase that wanders a little makes it smaller
+                height_std = float(np.hypot(steady.height_std, height - abs(steady.height)))
+                height = abs(steady.height)
             else:
                 steady = None
         rates = _own_rates(beat, height, height_std, rising)
