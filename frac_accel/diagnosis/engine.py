@@ -321,7 +321,7 @@ class Engine:
         """Sets without a cause, no larger than the best, by score; (margin, causes)."""
         if self.comparing(cause) is not self:
             return self.part.rivals(self.part.best, cause)
-        variance = best.cost / self.margin_of_all(best, cause)
+        variance = best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
         found = [(self._margin(fit, best, variance), fit.causes) for fit in
                  self.search.fits.values()
                  if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
@@ -330,11 +330,12 @@ class Engine:
                 if entry[0] > _CLOSE or not self.hollow(self.search.fits[entry[1]])]
 
     def margin_of_all(self, best, cause):
-        """Margin by which a set is ahead of one that leaves twice the power: as many variances of
-        the noise, where that is densest in frequency, as the record has samples that count."""
+        """Margin by which a set is ahead of one that leaves twice the power; what is left and is no
+        noise counts as if it were white: it may be any."""
         engine = self.comparing(cause)
         fitted = best if engine is self else engine.best
-        return engine.problem.count / noise_peak(fitted.residual, engine.problem.used)
+        peak = 1.0 if engine.structure(fitted) else noise_peak(fitted.residual, engine.problem.used)
+        return engine.problem.count / peak
 
     def _margin(self, rival, best, variance):
         """Variances of the noise by which a set is ahead of its rival; no lead of a rival that has
