@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
 from second_set_bench import RATE, Multisine, model, samples, times
 
 from frac_accel import Corrector
 from frac_accel.diagnosis import diagnose
+from frac_accel.model import SensorModel
+from frac_accel.model.core import Gain
 
 N, NOISE, POLLED_S = 8000, 0.01, 6.11e-4
 
@@ -86,6 +90,22 @@ def test_bursts_keep_what_a_filter_to_a_band_takes(seed):
     assert set(findings) == {"interference_bursts"}
     finding = findings["interference_bursts"]
     assert abs(finding.effect.rms - 0.3) < 3 * finding.std["rms"] < 0.1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sensor_that_is_stuck_now_and_then_has_no_bursts_beside_another_rate(seed):
+    """On the reference's instants nothing repeats, and it was noise from elsewhere."""
+    rng = np.random.default_rng([62, seed])
+    fine = sosfiltfilt(butter(2, [1, 12], "band", fs=4 * RATE, output="sos"),
+                       rng.normal(size=4 * N))
+    motion = CubicSpline(np.arange(4 * N) / (4 * RATE), fine / fine.std())
+    t, slower = np.arange(N - 20) / RATE, np.arange(round(0.85 * (N - 20))) / (0.85 * RATE)
+    values = motion(t) + 0.1 * NOISE * rng.normal(size=len(t))
+    for start in rng.choice(np.arange(200, N - 200, 120), 12, replace=False):
+        values[start:start + rng.integers(10, 20)] = values[start]
+    found = diagnose((samples(slower, motion(slower)), samples(t, values)),
+                     SensorModel(Gain(1.0)), "x")
+    assert not found.findings
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -31,7 +31,7 @@ _ALL_ONE_SIDED = 0.6
 # Share of the error budget that bursts must have, and where one topic was put on the other's
 # instants: there it lacks what is fast of the motion.
 _SHOWN, _SHOWN_RESAMPLED = 0.01, 0.5
-# Share of the samples in bursts that may repeat the one before them: a sensor that is stuck.
+# Share of the bursts' power in samples that repeat the one before: a sensor that is stuck.
 _REPEATED = 0.5
 # Share of what two noises gain that a noise which grows with the motion may gain.
 _AS_GOOD = 0.5
@@ -81,7 +81,7 @@ class InterferenceBursts(Effect):
                 or _follows(inside, error, output, len(starts)) \
                 or _one_sided(error, inside) \
                 or _grows(error, output) > _AS_GOOD * better \
-                or _repeated(seen.measured[used], inside) > _REPEATED:
+                or _repeated(*seen.as_recorded()) > _REPEATED:
             return None
         length = inside.sum() / len(starts)
         after = np.where(inside, error * np.sqrt(noise / loud), error)
@@ -222,6 +222,9 @@ def _allowed(count):
     return min(_UNRELATED + 3 / np.sqrt(count), _AT_MOST)
 
 
-def _repeated(measured, inside):
-    """Share of the samples in bursts that repeat the one before."""
-    return np.mean(np.diff(measured, prepend=np.nan)[inside] == 0)
+def _repeated(values, simulated, _):
+    """Share of the power of what is far out of the noise in samples that repeat the one before, as
+    they were recorded."""
+    error = values - simulated
+    power = np.where(np.abs(error) > _LOUDER * np.sqrt(_quiet(error)), error**2, 0.0)
+    return power @ (np.diff(values, prepend=np.nan) == 0) / max(power.sum(), 1e-300)
