@@ -96,7 +96,7 @@ class Filters:
         values = self._slower(target, self._all) if self._step > 1 else target
         values = np.where(self._used, values, 0.0)
         judged, whole = self._products_with(values)
-        best, ridge, gained = self._best_weights(self._whole, self._unseen, whole, judged)
+        _, ridge, gained = self._best_weights(self._whole, self._unseen, whole, judged)
         power = sum(np.sum(values[start:stop]**2) for start, stop in self._runs)
         return solve(self._whole, whole, ridge), 1 - gained / max(power, 1e-300)
 

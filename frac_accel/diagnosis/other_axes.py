@@ -2,11 +2,17 @@
 
 import dataclasses
 
-from ..model import is_link
+from ..errors import FracAccelError
+from ..model import AXES, is_link
+from ..model.effects import known_effects
 from ..model.effects.base import CROSS_AXIS
+from .empirical import EmpiricalFit
+from .gain import gain
 
 # Share of the power of what is left that comes from across, from which on it asks for an answer.
 _FROM_ACROSS = 0.2
+# Share of an axis at which a fit begins.
+_ACROSS = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,3 +86,25 @@ def may_be_unlike(engine, best):
         return False
     unlike = fitted.problem.beside(dataclasses.replace(p.others, alike=False))
     return unlike.fit(best.effects).cost - best.cost < fitted.threshold(best)
+
+
+def fit_shares(problem, effects, output, rest):
+    """Share of each other axis that describes what an output leaves (`EmpiricalFit`; its `order` is
+    their number), learnt on all but the rows that are held out.
+
+    Raises
+    ------
+    FracAccelError
+        If no other axis moves, or something comes across from them already.
+    """
+    p = problem
+    cls, = (cls for cls in known_effects().values() if cls.describes == "across")
+    others = cls.fitted_parameters(AXES[p.axis], p.excited)
+    if not others or _crosses(effects):
+        raise FracAccelError("nothing more can come across")
+    learning = p.restricted(p.used & ~rest)
+    start = cls(**dict.fromkeys(others, _ACROSS))
+    effect = learning.fit({**effects, cls.cause: start}, held=effects).effects[cls.cause]
+    described = p.simulate({**effects, cls.cause: effect})
+    return EmpiricalFit(effect, len(others), None,
+                        gain((p.measured - output)[rest], (p.measured - described)[rest]))

@@ -9,15 +9,16 @@ from ..errors import FracAccelError
 from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.core import Oscillator
-from ..model.effects import fault_of_reference, known_effects
+from ..model.effects import fault_of_reference
 from . import courses
 from .doubts import delay_of_unseen_core, left_open, most_is_left, own_delay_s
-from .empirical import EmpiricalFit, fit_empirical_link
+from .empirical import fit_empirical_link
 from .empirical_map import fit_empirical_map
 from .evidence import Evidence
 from .finding import Diagnosis
 from .gain import gain
 from .naming import constants_of, moved, remaining, rms_of, sure, suspect
+from .other_axes import fit_shares
 from .own_core import in_own_core
 from .words import (
     AS_NOISE,
@@ -38,8 +39,6 @@ _INCOMPLETE = ("unexplained", "partly_explained")
 _CLEARLY = 0.9
 # Times as much of the held-out data (RMS) as the model in use leaves, that names must not leave.
 _MISLED = 1.1
-# Share of an axis at which a fit begins.
-_ACROSS = 1e-3
 # Share of what is left (power) that may be no noise in a record that counts as consistent, where so
 # little is left that it need not be noise; more of it where that is such a share of the output
 # (RMS) at most.
@@ -380,8 +379,8 @@ def _by_curves(engine, fitted, after, parts, named):
     for belongs, words, fit in (
             ({"slow"}, "a fitted course of the zero", lambda _, output: courses.fit_empirical_zero(
                 p, output, rest)),
-            ({"across"}, "a fitted share of each other axis", lambda effects, output:
-             _fit_across(p, effects, output, rest)),
+            ({"across"}, "a fitted share of each other axis", lambda effects, output: fit_shares(
+                p, effects, output, rest)),
             ({"linear"}, "a fitted filter", lambda _, output: fit_empirical_link(
                 p.measured, output, p.used, rest, p.rate)),
             ({"even", "odd"}, "a fitted curve", lambda _, output: fit_empirical_map(
@@ -407,21 +406,6 @@ def _by_curves(engine, fitted, after, parts, named):
     return Curves({cause: effect for cause, effect in effects.items()
                    if effect is not fitted.effects.get(cause)}, described, after,
                   output if described else None)
-
-
-def _fit_across(p, effects, output, rest):
-    """`EmpiricalFit` of what the other axes add to an output, learnt on all but the rows that are
-    held out."""
-    cls, = (cls for cls in known_effects().values() if cls.describes == "across")
-    others = cls.fitted_parameters(AXES[p.axis], p.excited)
-    if not others or any(effect.stage == cls.stage for effect in effects.values()):
-        raise FracAccelError("nothing more can come across")
-    learning = p.restricted(p.used & ~rest)
-    start = cls(**dict.fromkeys(others, _ACROSS))
-    effect = learning.fit({**effects, cls.cause: start}, held=effects).effects[cls.cause]
-    described = p.simulate({**effects, cls.cause: effect})
-    return EmpiricalFit(effect, len(others), None,
-                        gain((p.measured - output)[rest], (p.measured - described)[rest]))
 
 
 def _kept(engine, named, widest, after):
