@@ -153,10 +153,11 @@ def table(found, axis):
                   f"  {suspect['experiment']}"]
     if found.cut_off:
         lines.append(found.cut_off)
-    if found.findings:
+    if found.is_extended:
         lines.append(f"the extended model leaves {found.extended['rmse']:.4g} "
-                     f"({found.extended['nrmse']:.3%}); {found.unexplained_fraction:.1%} of the "
-                     "error's power above the noise is unexplained")
+                     f"({found.extended['nrmse']:.3%})" + (
+                         f"; {found.unexplained_fraction:.1%} of the error's power above the noise "
+                         "is unexplained" if found.findings else ""))
         lines += _parted(found, "extended", "of what that leaves")
     return "\n".join(lines)
 

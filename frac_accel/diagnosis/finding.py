@@ -110,6 +110,11 @@ class Diagnosis(Shown):
         return f"<Diagnosis: {self.verdict}{': ' if causes else ''}{causes}; {self.reason}>"
 
     @property
+    def is_extended(self):
+        """Whether the extended model is another one than the model in use."""
+        return bool(self.findings) or self.extended["rmse"] < self.baseline["rmse"]
+
+    @property
     def noise_words(self):
         """How much of what the model in use leaves is noise."""
         known = self.established_noise

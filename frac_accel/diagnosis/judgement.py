@@ -55,7 +55,7 @@ def judge(engine, best, found, shown, noise_std=None):
         best = engine.whole({cause: effect for cause, effect in shorter.best.effects.items()
                              if cause not in shorter.doubts})
     settled, more = _settled(engine, best, noise_std, known)
-    best, gains, left, noise, stds, doubts = settled
+    best, gains, _, noise, stds, doubts = settled
     doubted |= more
     findings, tied = [], {}
     nearly = 0.0 if engine.is_accounted(best, noise) else _NEARLY
@@ -89,6 +89,8 @@ def judge(engine, best, found, shown, noise_std=None):
         else:
             suspects.append(suspect({cause, *instead}, margin, "another cause explains as much"))
             tied[cause] = other
+    # what comes and goes with the motion bends no cause, but may be an unknown one's
+    left = engine.left(best)
     return verdict_on(engine, Likely(best, widest, left, noise, findings, suspects, tied), found,
                       lambda fitted: read_off(engine, fitted, found, shown))
 

@@ -129,17 +129,17 @@ def verdict_on(engine, likely, found, shown_by):
 
 def _named(engine, likely, shown_by, back):
     """`Named`, without the causes that are taken back (words by cause)."""
-    best, left = likely.best, likely.left
+    best, left, beside = likely.best, likely.left, engine.left_beside_noise(likely.best)
     fraction = remaining(engine, best, left.noise_rms) if left.share > 0 else 0.0
     findings, fitted, stds, more = sure(
-        engine, best, [f for f in likely.findings if f.cause not in back], likely.tied, left,
+        engine, best, [f for f in likely.findings if f.cause not in back], likely.tied, beside,
         fraction)
     unnamed = sorted(fitted.causes - {f.cause for f in findings} - engine.search.base.keys())
     complete = fitted.causes >= best.causes
     if not complete:
         fraction = remaining(engine, fitted, left.noise_rms)
     # beside the model as it is in the end, not beside one with what is only suspected
-    away, near = moved(engine, fitted, stds, most_is_left(engine, left, likely.noise))
+    away, near = moved(engine, fitted, stds, most_is_left(engine, beside, likely.noise))
     drifts, other_course = courses.findings(engine, fitted, stds)
     other_course |= {f.cause: back[f.cause] for f in drifts if f.cause in back}
     doubted = {**{cause: back[cause] for cause in sorted(back)}, **near, **other_course}

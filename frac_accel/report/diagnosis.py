@@ -69,9 +69,8 @@ def _verdict(section, found):
 
 def _budget(section, found):
     shares = {(entry["of"], entry["part"]): entry for entry in found.budget}
-    # without a cause both models are one
-    models = {"baseline": "model in use", "extended": "extended model"} if found.findings else {
-        "baseline": "model in use"}
+    models = {"baseline": "model in use", **(
+        {"extended": "extended model"} if found.is_extended else {})}
     rows = []
     for part, words in WORDS.items():
         entries = [shares.get((of, part)) for of in models]
@@ -145,8 +144,8 @@ def _causes(section, found):
 
 
 def _suspects(section, found):
-    section.text("These fit, but so do others, or too much stays unexplained to name them. They "
-                 "are not part of the extended model.")
+    section.text("These fit, but so do others, or too much stays unexplained to name them. The "
+                 "extended model has those only that the verdict says it keeps.")
     section.table(["suspects", "margin", "experiment that tells"],
                   [[_listed(suspect["causes"]), f"{suspect['margin']:.3g}", suspect["experiment"]]
                    for suspect in found.suspects],
