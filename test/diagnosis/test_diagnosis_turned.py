@@ -39,8 +39,9 @@ def drive(seed, late_s, left=0.3, offset=0.0):
 def test_the_written_model_leaves_what_is_claimed(seed, tmp_path):
     *pair, true, turn = drive(seed, 0.2)
     found = diagnose(tuple(pair))
-    assert [f.cause for f in found.findings] == ["misalignment"]
-    finding, = found.findings
+    delay, finding = found.findings
+    assert (delay.cause, finding.cause) == ("reference_delay", "misalignment")
+    assert abs(delay.effect.delay_s - 0.2) < 3 * delay.std["delay_s"] < 0.05
     # exactly the rotation that the signal was turned by, wherever its angles lie
     assert np.degrees(np.abs(finding.effect.rotation.T - turn)).max() < 3
     assert finding.std["roll_deg"] > 10 * finding.std["pitch_deg"]
