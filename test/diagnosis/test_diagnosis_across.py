@@ -5,9 +5,11 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from frac_accel import diagnose, validate
+from frac_accel.commands.diagnose import table
 from frac_accel.io.samples import Samples
 from frac_accel.model import SensorModel
 from frac_accel.model.core import Gain
+from frac_accel.report.diagnosis import diagnosis_page
 
 RATE = 100.0
 
@@ -28,5 +30,8 @@ def test_shares_of_other_axes_describe_what_hides_behind_more(seed):
     found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
     assert not found.findings
     assert found.extended["nrmse"] < 0.035 < found.baseline["nrmse"]
+    # told, though nothing is named
+    assert f"the extended model leaves {found.extended['rmse']:.4g} " in table(found, "x")
+    assert ">extended model</th>" in diagnosis_page(found).html()
     assert validate(record, found.model).whole_nrmse == pytest.approx(
         found.extended["nrmse"], rel=0.2)
