@@ -9,8 +9,8 @@ from scipy.fft import irfft, rfft
 from ..identification.response.recognise import recognise
 from ..record.resampling import BAND
 from . import memory, repeats, shapes, unrelated
-from .blocks import FOLDS, Blocks, intervals
-from .filters import Filters
+from .blocks import Blocks, intervals
+from .filters import SAMPLES, Filters, can_be_judged, lag_step
 from .modulated import Modulated
 
 # In the order in which they are taken from the residual.
@@ -48,8 +48,6 @@ _QUICK_LENGTHS = 5
 _SHAPE_LENGTHS = ((0, 0), (-1, 2), (-4, 12))
 # A filter of the likeliest shapes that may ring as the sensor does.
 _RINGING = (2, (-16, 112))
-# Counted samples for each coefficient.
-_SAMPLES = 10
 # A filter beside integrals of the motion, which does what they do not.
 _BESIDE = (-4, 8)
 # Shapes of what drives the sensor are filtered as the motion is; correlation of both from which
@@ -81,11 +79,10 @@ _OCTAVES = 6
 # Energy of the reference below which lies what counts as slower than it, and that of a tone's
 # peaks from which the reference is made of tones.
 _LOWEST = 0.01
-# Energy below which all of the reference's band lies, samples of its fastest cycle that are enough
-# for a filter of it and its harmonics, and samples that must stay.
+# Energy below which all of the reference's band lies, and samples of its fastest cycle that are
+# enough for a filter of it and its harmonics.
 _HIGHEST = 0.995
 _FASTER = 8
-_FEWEST = 1000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -214,8 +211,7 @@ class Division:
 
     def fits(self, coefficients, span, step):
         """Whether the record is long enough for a filter."""
-        return coefficients * _SAMPLES * step <= self.used.sum() and (
-            span <= 1 or 2 * span * step <= self.blocks.shortest * len(self.blocks) / FOLDS)
+        return can_be_judged(self.blocks, self.used, coefficients, span, step)
 
     @property
     def usual_lags(self):
@@ -259,11 +255,7 @@ class _One:
     def _step(self):
         """Samples of a lag: more than one where motion and residual are far slower than that."""
         r = self.r
-        highest = 0.0
-        for values in (r.x, self.e - self.e[r.used].mean()):
-            energy = np.cumsum(np.abs(rfft(values * r.used * np.hanning(r.n)))**2)
-            highest = max(highest, np.searchsorted(energy, _HIGHEST * energy[-1]) / r.n)
-        return int(np.clip(1 / (_FASTER * max(highest, 1e-9)), 1, max(r.n // _FEWEST, 1)))
+        return lag_step((r.x, self.e - self.e[r.used].mean()), r.used, _HIGHEST, _FASTER)
 
     def budget(self):
         r = self.r
@@ -554,7 +546,7 @@ class _One:
             return np.stack([base[start:stop] for base in bases], axis=1)
         waves = Modulated(columns, target, self.counted, r.blocks)
         for count in _COURSES:
-            if count * len(bases) * _SAMPLES <= r.used.sum() and 2 * count <= len(r.blocks):
+            if count * len(bases) * SAMPLES <= r.used.sum() and 2 * count <= len(r.blocks):
                 yield count, count * len(bases), lambda count=count: waves.predict(
                     range(1, count + 1))
 
@@ -601,7 +593,7 @@ class _One:
         size = 2 * len(self.modulation) * len(bases)
         modulated = Modulated(columns, target, self.counted, r.blocks)
         for orders in unrelated.LINE_COURSES[:2]:
-            if size * orders * _SAMPLES <= r.used.sum() and 2 * orders <= len(r.blocks):
+            if size * orders * SAMPLES <= r.used.sum() and 2 * orders <= len(r.blocks):
                 yield orders, size * orders, lambda orders=orders: modulated.predict(range(orders))
 
     def _modulation(self, target, bases):

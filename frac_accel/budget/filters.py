@@ -1,6 +1,7 @@
 """Filters of several inputs, fitted to a residual by least squares and judged by other blocks."""
 
 import numpy as np
+from scipy.fft import rfft
 from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import fftconvolve, oaconvolve
@@ -16,6 +17,35 @@ _NO_NOISE = 1e-12
 _TOGETHER, _MANY_LAGS = 1 << 19, 100
 # Samples that are enough to learn from: of longer records, the first part of each block.
 _ENOUGH = 150_000
+# Counted samples for each coefficient, and the fewest that are left where lags are longer.
+SAMPLES = 10
+_FEWEST = 1000
+
+
+def lag_step(signals, used, highest, faster):
+    """Samples of a lag: more than one where signals, each of mean 0, are far slower than that.
+
+    Parameters
+    ----------
+    signals : sequence of ndarray, shape (n,)
+    used : ndarray of bool, shape (n,)
+    highest : float
+        Share of their power up to which they have frequencies.
+    faster : float
+        Lags in a cycle there.
+    """
+    n, top = len(used), 0.0
+    for values in signals:
+        energy = np.cumsum(np.abs(rfft(values * used * np.hanning(n)))**2)
+        top = max(top, np.searchsorted(energy, highest * energy[-1]) / n)
+    return int(np.clip(1 / (faster * max(top, 1e-9)), 1, max(n // _FEWEST, 1)))
+
+
+def can_be_judged(blocks, used, coefficients, span, step):
+    """Whether a record is long enough for a filter of so many coefficients that spans so many
+    lags."""
+    return coefficients * SAMPLES * step <= used.sum() and (
+        span <= 1 or 2 * span * step <= blocks.shortest * len(blocks) / FOLDS)
 
 
 class Filters:
@@ -85,7 +115,8 @@ class Filters:
         ndarray, shape (n,)
         """
         if self._step > 1:
-            values = self._slower(target, self._all if left_out is None else self._all & ~left_out)
+            counted = self._all if left_out is None else self._all & ~left_out
+            values = self._slower(target, counted)
             result = self._predict(values, None if left_out is None else left_out[::self._step])
             return _thickened(result, self._step, len(target))
         return self._predict(target, left_out)
@@ -93,8 +124,7 @@ class Filters:
     def learnt(self, target):
         """The weights that all counted samples give, shape (size,), and the share of the target's
         power that those of the folds leave of what they have not seen."""
-        values = self._slower(target, self._all) if self._step > 1 else target
-        values = np.where(self._used, values, 0.0)
+        values = np.where(self._used, self._slower(target, self._all), 0.0)
         judged, whole = self._products_with(values)
         _, ridge, gained = self._best_weights(self._whole, self._unseen, whole, judged)
         power = sum(np.sum(values[start:stop]**2) for start, stop in self._runs)
@@ -141,6 +171,8 @@ class Filters:
 
     def _slower(self, target, counted):
         """Every step-th sample of a target, smoothed as the inputs are."""
+        if self._step == 1:
+            return target
         return _thinned(np.where(counted, target, 0.0), self._step) \
             / np.maximum(_thinned(counted.astype(float), self._step), 1e-3)
 

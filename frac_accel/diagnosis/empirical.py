@@ -6,8 +6,8 @@ import itertools
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 
-from ..budget.blocks import FOLDS, Blocks
-from ..budget.filters import Filters
+from ..budget.blocks import Blocks
+from ..budget.filters import Filters, can_be_judged, lag_step
 from ..errors import FracAccelError
 from ..model.effects import effect_of
 from ..signals.convolution import Convolution
@@ -15,11 +15,10 @@ from .gain import Gain, gain
 from .rational import fit_rational
 
 _ORDERS = (1, 2, 3, 4, 6, 8, 12, 16)
-# Lags of the filters, the first and the last; samples for each of them; where the power of both
-# signals ends, lags in a cycle there, and the fewest samples that are left.
+# Lags of the filters, the first and the last; where the power of both signals ends, and lags in a
+# cycle there.
 _LAGS = ((-4, 8), (-16, 32), (-48, 96), (-96, 192))
-_SAMPLES = 10
-_HIGHEST, _FASTER, _FEWEST = 0.999, 4, 1000
+_HIGHEST, _FASTER = 0.999, 4
 # Shares of their energy at which weights begin, and a response's power over the largest from which
 # it is known.
 _BEGINS = (1e-4, 1e-2)
@@ -127,7 +126,7 @@ def _by_spectra(measured, simulated, learn, rate):
     delays = sorted({0.0, every.delay_s()}, key=abs)
     best, chosen = np.inf, None
     for how in itertools.product(_ORDERS, delays, every.weights):
-        error = sum(other.error(one.fit(*how)) for one, other in halves)
+        error = sum(other.apart(one.fit(*how)) for one, other in halves)
         if error < (_CLEARLY if chosen else 1.0) * best:
             best, chosen = error, how
     return chosen[0], every.fit(*chosen), every.band_hz
@@ -137,12 +136,11 @@ def _by_lags(measured, simulated, learn, rate):
     """Order, effect and band by least squares over lags; None where no length has enough samples,
     or none predicts what it was not fitted to."""
     x, y = (values - float(np.mean(values[learn])) for values in (simulated, measured))
-    blocks, step = Blocks.of(np.where(learn, x, 0.0)), _step(x, y, learn)
+    blocks, step = Blocks.of(np.where(learn, x, 0.0)), lag_step((x, y), learn, _HIGHEST, _FASTER)
     best, chosen = 1.0, None
     for span in _LAGS:
         size = span[1] - span[0] + 1
-        if size * step * _SAMPLES > learn.sum() \
-                or 2 * size * step > blocks.shortest * len(blocks) / FOLDS:
+        if not can_be_judged(blocks, learn, size, size, step):
             break
         weights, left = Filters([x], [span], blocks, learn, step).learnt(y)
         if left < (_LONGER**2 if chosen else 1.0) * best:
@@ -152,34 +150,51 @@ def _by_lags(measured, simulated, learn, rate):
     return _Lags(x, *chosen, step / rate, 1 / rate).fit(best)
 
 
-def _step(x, y, learn):
-    """Samples of a lag: more than one where both signals are far slower than that."""
-    window, highest = learn * np.hanning(len(x)), 0.0
-    for values in (x, y):
-        energy = np.cumsum(np.abs(rfft(values * window))**2)
-        highest = max(highest, np.searchsorted(energy, _HIGHEST * energy[-1]) / len(x))
-    return int(np.clip(1 / (_FASTER * max(highest, 1e-9)), 1, max(len(x) // _FEWEST, 1)))
+class _Known:
+    """A response by frequency, with the power of what it answers to."""
+
+    def __init__(self, frequency, ratio, power):
+        self.frequency, self.ratio, self.power = frequency, ratio, power
+        self.strong = power > _STRONG * power.max()
+        self.band_hz = tuple(frequency[self.strong][[0, -1]].tolist())
+
+    def apart(self, effect):
+        """Power by which a filter's output is another one, over that of the output."""
+        s = 2j * np.pi * self.frequency
+        left = self.ratio - effect.transfer_function(s) * np.exp(-s * effect.delay_s)
+        counted = self.power * self.strong
+        return float(np.sum(counted * np.abs(left)**2) / np.sum(counted * np.abs(self.ratio)**2))
+
+    def nearest(self, order, delay_s, weight, least_damping_hz, slowest_hz):
+        """EmpiricalLink of an order and a delay that comes nearest; where nothing is known, it is
+        drawn to one."""
+        scale, wanted = self.band_hz[1], np.where(self.strong, self.ratio, 1.0)
+        numerator, denominator = fit_rational(
+            1j * self.frequency / scale, wanted * np.exp(2j * np.pi * self.frequency * delay_s),
+            weight, order, least_damping_hz / scale,
+            (slowest_hz / scale, _FASTEST * self.frequency[-1] / scale))
+        return effect_of("empirical_link")(tuple(numerator.tolist()), tuple(denominator.tolist()),
+                                           float(scale), delay_s)
 
 
-class _Lags:
+class _Lags(_Known):
     """A filter of so many samples before and after, and rational ones like it."""
 
     def __init__(self, x, span, weights, lag_s, interval_s):
         self.lags_s = np.arange(span[0], span[1] + 1) * lag_s
         self.weights = weights
         # what is slower than all of it counts, too
-        self.frequency = np.linspace(0, 0.5 / lag_s, 2 * len(weights))
-        self.frequency[0] = self.frequency[1] / 100
-        self.ratio = np.exp(-2j * np.pi * np.outer(self.frequency, self.lags_s)) @ weights
+        frequency = np.linspace(0, 0.5 / lag_s, 2 * len(weights))
+        frequency[0] = frequency[1] / 100
         power = np.abs(rfft(x * np.hanning(len(x))))**2
-        edges = (np.r_[0.0, self.frequency] + np.r_[self.frequency, self.frequency[-1]]) / 2
+        edges = (np.r_[0.0, frequency] + np.r_[frequency, frequency[-1]]) / 2
         edges = np.clip(edges * len(x) * interval_s, 0, len(power) - 1)
-        self.power = np.array([power[int(a):int(b) + 1].mean() for a, b in zip(edges, edges[1:])])
-        self.strong = self.power > _STRONG * self.power.max()
-        self.band_hz = tuple(self.frequency[self.strong][[0, -1]].tolist())
+        super().__init__(
+            frequency, np.exp(-2j * np.pi * np.outer(frequency, self.lags_s)) @ weights,
+            np.array([power[int(a):int(b) + 1].mean() for a, b in zip(edges, edges[1:])]))
 
     def delays_s(self):
-        """None, and where the weights begin."""
+        """No delay, and those at which the weights begin."""
         so_far = np.cumsum(self.weights**2)
         return sorted({0.0, *(float(self.lags_s[np.searchsorted(so_far, share * so_far[-1])])
                               for share in _BEGINS)}, key=abs)
@@ -187,36 +202,16 @@ class _Lags:
     def fit(self, left):
         """Order, effect and band of the smallest order that is about as good as the filter itself,
         which leaves a share of the power; or as any."""
-        wanted = np.where(self.strong, self.ratio, 1.0)
         weight = np.sqrt(np.where(self.strong, self.power / self.power.max(), _STRONG))
         best, chosen, fades_hz = np.inf, None, 1 / (2 * np.pi * np.ptp(self.lags_s))
         for order, delay_s in itertools.product(_ORDERS, self.delays_s()):
-            effect = _rational(self.frequency, wanted, weight, order, delay_s,
-                               (fades_hz, self.band_hz[1]), fades_hz)
-            error = left + self._apart(effect)
+            effect = self.nearest(order, delay_s, weight, fades_hz, fades_hz)
+            error = left + self.apart(effect)
             if error < (_CLEARLY**2 if chosen else 1.0) * best:
                 best, chosen = error, (order, effect, self.band_hz)
             if best * _CLEARLY**2 < left:
                 break
         return chosen
-
-    def _apart(self, effect):
-        """Power by which a filter's output is another one, over the measured power that this one
-        explains."""
-        s = 2j * np.pi * self.frequency
-        apart = self.ratio - effect.transfer_function(s) * np.exp(-s * effect.delay_s)
-        power = self.power * self.strong
-        return float(np.sum(power * np.abs(apart)**2) / np.sum(power * np.abs(self.ratio)**2))
-
-
-def _rational(frequency, wanted, weight, order, delay_s, band_hz, least_damping_hz):
-    """EmpiricalLink of an order and a delay that comes nearest to a response."""
-    scale = band_hz[1]
-    numerator, denominator = fit_rational(
-        1j * frequency / scale, wanted * np.exp(2j * np.pi * frequency * delay_s), weight, order,
-        least_damping_hz / scale, (band_hz[0] / scale, _FASTEST * frequency[-1] / scale))
-    return effect_of("empirical_link")(tuple(numerator.tolist()), tuple(denominator.tolist()),
-                                       float(scale), delay_s)
 
 
 def _segments(values, learn):
@@ -231,7 +226,7 @@ def _segments(values, learn):
     return values[place] - values[place].mean(axis=1, keepdims=True)
 
 
-class _Response:
+class _Response(_Known):
     """Averaged response of some segments, and fits to it."""
 
     def __init__(self, x, y, rate):
@@ -240,17 +235,13 @@ class _Response:
         x, y = rfft(x * window, axis=1)[:, 1:], rfft(y * window, axis=1)[:, 1:]
         own, other = (np.mean(np.abs(v)**2, axis=0) for v in (x, y))
         shared = np.mean(np.conj(x) * y, axis=0)
-        self.frequency = rfftfreq(size, 1 / rate)[1:]
-        self.ratio = shared / np.maximum(own, 1e-300)
+        super().__init__(rfftfreq(size, 1 / rate)[1:], shared / np.maximum(own, 1e-300), own)
         coherence = np.clip(np.abs(shared)**2 / np.maximum(own * other, 1e-300), 1e-6, 1 - 1e-9)
         variance = np.abs(self.ratio)**2 * (1 - coherence) / (2 * len(x) * coherence)
-        self.strong = own > _STRONG * own.max()
         # what a filter of too low an order does best: what is known best, or is most of the output;
         # no better known than in a hundredth of its spread: leakage is as large
         self.weights = {"known": 1 / np.sqrt(variance + 1e-8),
                         "loud": np.sqrt(own / own.max()) * 1e4}
-        self.power = own
-        self.band_hz = tuple(self.frequency[self.strong][[0, -1]].tolist())
 
     def delay_s(self):
         """Slope of the phase over frequency, where there is power."""
@@ -258,17 +249,8 @@ class _Response:
         phase, wave = np.unwrap(np.angle(self.ratio)), 2 * np.pi * self.frequency
         return float(-np.sum(share * phase * wave) / np.sum(share * wave**2))
 
-    def error(self, effect):
-        """Power of what a filter leaves, over that of the output."""
-        s = 2j * np.pi * self.frequency
-        left = self.ratio - effect.transfer_function(s) * np.exp(-s * effect.delay_s)
-        counted = self.power * self.strong
-        return float(np.sum(counted * np.abs(left)**2) / np.sum(counted * np.abs(self.ratio)**2))
-
     def fit(self, order, delay_s, weight):
         """EmpiricalLink of an order, best where the response is `known` best, or where the motion
         is `loud`."""
-        # where nothing is known: about one
-        return _rational(self.frequency, np.where(self.strong, self.ratio, 1.0),
-                         np.where(self.strong, self.weights[weight], 1.0), order, delay_s,
-                         self.band_hz, _LEAST_DAMPING * self.band_hz[1])
+        return self.nearest(order, delay_s, np.where(self.strong, self.weights[weight], 1.0),
+                            _LEAST_DAMPING * self.band_hz[1], self.band_hz[0])

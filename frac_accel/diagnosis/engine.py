@@ -119,6 +119,7 @@ class Engine:
         # limit, and those in which it drowns all else
         self.at_limit = self.drowned = np.zeros(len(record), bool)
         self._learnt, self._budgets, self._structures, self._left = {}, {}, {}, {}
+        self._audible = {}
         # what the numerics may still be wrong by: of the simulation, and of other instants
         self.floor = (_RESAMPLED if record.resampled else _SIMULATED) \
             * float(np.std(record.sensor[used, axis]))
@@ -458,7 +459,7 @@ class Engine:
         return _once(self._structures, fitted, self._structure_of)
 
     def _structure_of(self, fitted):
-        parts, step = self.budget(fitted, self.silent).parts, self.coarse_step(fitted)
+        parts, step = self._audible_parts(fitted), self.coarse_step(fitted)
         rounded = {}
         if step:
             p = self.problem
@@ -469,6 +470,11 @@ class Engine:
         own = self._no_fault(fitted)
         return self.standing_out(parts, {entry["part"]: rounded.get(entry["part"], 0.0) + own
                                          for entry in parts})
+
+    def _audible_parts(self, fitted):
+        """Parts of the budget of a fit without the samples that say nothing of other causes."""
+        return _once(self._audible, fitted,
+                     lambda fitted: self.budget(fitted, self.silent).parts)
 
     @staticmethod
     def standing_out(parts, less):
@@ -727,9 +733,8 @@ class Engine:
         """The same, where noise may grow with the motion: what comes and goes with that, and
         nothing predicts, bends no cause that is found."""
         found = self.left(fitted)
-        predicted = [entry for entry in self.budget(fitted, self.silent).parts
-                     if entry["part"] != "noise" and entry["share"] > _OF_NOISE.get(
-                         entry["part"], _PART)]
+        predicted = [entry for entry in self._audible_parts(fitted) if entry["part"] != "noise"
+                     and entry["share"] > _OF_NOISE.get(entry["part"], _PART)]
         return found if predicted else dataclasses.replace(found, level_score=0.0)
 
     def _leftover(self, fitted, residual, across):

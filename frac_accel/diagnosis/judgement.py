@@ -55,7 +55,7 @@ def judge(engine, best, found, shown, noise_std=None):
         best = engine.whole({cause: effect for cause, effect in shorter.best.effects.items()
                              if cause not in shorter.doubts})
     settled, more = _settled(engine, best, noise_std, known)
-    best, gains, _, noise, stds, doubts = settled
+    best, gains, noise, stds, doubts = settled
     doubted |= more
     findings, tied = [], {}
     nearly = 0.0 if engine.is_accounted(best, noise) else _NEARLY
@@ -100,7 +100,6 @@ class Examined(NamedTuple):
 
     best: object
     gains: dict
-    left: object
     noise: object
     stds: dict
     doubts: dict
@@ -208,7 +207,7 @@ def _examined(engine, best, noise_std, known):
     noise = engine.established_noise(best, noise_std)
     stds = engine.uncertainties(best)
     judged = {cause: g for cause, g in gains.items() if cause not in known}
-    return Examined(best, gains, left, noise, stds,
+    return Examined(best, gains, noise, stds,
                     doubts_about(engine, best, judged, stds, left, noise))
 
 

@@ -182,16 +182,14 @@ def _described(engine, named, sets):
     if not (verdict in _INCOMPLETE or (strange and not plain)):
         return Described(verdict, plain, {}, [], [], named.findings, account.after, None)
     named_causes = {f.cause for f in named.findings}
-    described = _by_curves(engine, fitted, account.after, {part for _, part in strange},
-                           named_causes)
+    described = _by_curves(engine, fitted, account.after, named_causes)
     wider, known = None, {}
     for each in {each.causes: each for each in sets}.values():
         found = _kept(engine, named, each, account.after)
         if found is None:
             continue
         fit, stds, error = found
-        with_it = _by_curves(engine, fit, error, {part for _, part in engine.structure(fit)},
-                             named_causes)
+        with_it = _by_curves(engine, fit, error, named_causes)
         if with_it.after <= _CLEARLY * described.after:
             wider, known, described = fit, stds, with_it
     effects, words, after, output = described
@@ -366,7 +364,7 @@ def _account(engine, fitted, findings, noise):
                    accounted and not is_covered(everywhere, over))
 
 
-def _by_curves(engine, fitted, after, parts, named):
+def _by_curves(engine, fitted, after, named):
     """`Curves` that stand for what no cause explains, with a constant that has no name as it is
     beside them.
 
@@ -374,6 +372,7 @@ def _by_curves(engine, fitted, after, parts, named):
     comes across, a fitted filter where one is linear, and a fitted curve where one is even or odd.
     """
     p, described = engine.problem, []
+    parts = {part for _, part in engine.structure(fitted)}
     rest, effects, output = engine.held_out_rows, fitted.effects, fitted.output
     constants = constants_of(effects) - engine.search.base.keys() - named
     for belongs, words, fit in (

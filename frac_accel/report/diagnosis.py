@@ -69,8 +69,9 @@ def _verdict(section, found):
 
 def _budget(section, found):
     shares = {(entry["of"], entry["part"]): entry for entry in found.budget}
-    models = {"baseline": "model in use", **(
-        {"extended": "extended model"} if found.is_extended else {})}
+    models = {"baseline": "model in use"}
+    if found.is_extended:
+        models["extended"] = "extended model"
     rows = []
     for part, words in WORDS.items():
         entries = [shares.get((of, part)) for of in models]

@@ -142,8 +142,9 @@ def test_slow_motion_is_as_late_as_the_phase_says(seed):
     rng = np.random.default_rng([34, seed])
     order = int(rng.integers(1, 5))
     poles = -rng.uniform(0.1, 2, order)
-    link = effect_of("empirical_link")(tuple(rng.normal(size=rng.integers(1, order + 2))),
-                         tuple(np.poly(poles)), rng.uniform(0.1, 100), rng.normal())
+    link = effect_of("empirical_link")(
+        tuple(rng.normal(size=rng.integers(1, order + 2))), tuple(np.poly(poles)),
+        rng.uniform(0.1, 100), rng.normal())
     s = 2j * np.pi * link.frequency_hz * 1e-5 * np.array([-1, 1])
     phase = np.diff(np.unwrap(np.angle(link.transfer_function(s) * np.exp(-s * link.delay_s))))[0]
     assert link.slow_delay_s() == pytest.approx(-phase / np.ptp(s.imag), rel=1e-4, abs=1e-9)

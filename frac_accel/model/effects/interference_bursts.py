@@ -80,8 +80,11 @@ class InterferenceBursts(Effect):
         if len(starts) < (_FEWEST if mostly else _SEVERAL) or _going_on(error, noise) < _GOES_ON \
                 or _follows(inside, error, output, len(starts)) \
                 or _one_sided(error, inside) \
-                or _grows(error, output) > _AS_GOOD * better \
-                or _repeated(*seen.as_recorded()) > _REPEATED:
+                or _grows(error, output) > _AS_GOOD * better:
+            return None
+        values, simulated, _ = seen.as_recorded()
+        recorded = values - simulated
+        if _repeated(values, recorded) > _REPEATED:
             return None
         length = inside.sum() / len(starts)
         after = np.where(inside, error * np.sqrt(noise / loud), error)
@@ -90,17 +93,16 @@ class InterferenceBursts(Effect):
         drowned[used] = np.convolve(inside, np.ones(_WINDOW), "same") > 0.5
         words = (f"{len(starts)} bursts of {length:.3g} samples on average, "
                  f"{np.sqrt(loud / noise):.3g} times as loud as the rest, whatever the motion does")
-        count, rms, taken = len(error), float(np.sqrt(loud - noise)), 0.0
+        count, within = len(error), np.sqrt(loud - noise)
         if seen.record.band_hz is not None:
             # a filter takes of their power, and makes them longer
-            values, simulated, _ = seen.as_recorded()
-            found = _two_noises(values - simulated)
+            found = _two_noises(recorded)
             if 0 < found[2] <= share and found[1] > loud:
-                (noise, loud, share, _), count = found, len(values)
-                taken, rms = float(np.sqrt(loud - noise)) - rms, float(np.sqrt(loud - noise))
+                (noise, loud, share, _), count = found, len(recorded)
+        rms = float(np.sqrt(loud - noise))
         std = rms / np.sqrt(2 * share * count) * loud / (loud - noise)
         stds = {"share": float(np.sqrt(share * (1 - share) * max(2 * length, 1) / count)),
-                "rms": float(np.hypot(std, _OF_FILTER * taken))}
+                "rms": float(np.hypot(std, _OF_FILTER * (rms - within)))}
         alone = seen.parts().keys() == {"bursts"}
         return cls(float(share), rms), Reading(
             stds, error, after, words, drowned,
@@ -222,9 +224,7 @@ def _allowed(count):
     return min(_UNRELATED + 3 / np.sqrt(count), _AT_MOST)
 
 
-def _repeated(values, simulated, _):
-    """Share of the power of what is far out of the noise in samples that repeat the one before, as
-    they were recorded."""
-    error = values - simulated
+def _repeated(values, error):
+    """Share of the power of what is far out of the noise in samples that repeat the one before."""
     power = np.where(np.abs(error) > _LOUDER * np.sqrt(_quiet(error)), error**2, 0.0)
     return power @ (np.diff(values, prepend=np.nan) == 0) / max(power.sum(), 1e-300)
