@@ -36,10 +36,11 @@ from .other_axes import OtherAxes, may_be_unlike
 from .read_off import drowned
 from .screened import screened
 from .search import is_nonlinear
+from .seen import added, by_sample
 from .spikes import spikes, spikes_words
 from .sprung import beside_spring, is_better, may_hide_one, oscillator_of
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
-from .stretches import MOST, strongest_part
+from .stretches import MOST, Stretches, strongest_part
 from .time_limit import TimeLimit
 from .turned import with_turn
 
@@ -66,6 +67,9 @@ _FILTERS = 3
 _CLIPPED_REFERENCE = 0.02
 # Times that a model is identified with lost samples in their places.
 _IDENTIFIED_AGAIN = 2
+# Times that all else is looked for without what is known of each sample, and the shares of what is
+# left (RMS) that this must be, and by which it must differ from what was known before.
+_KNOWN_AGAIN, _KNOWN, _KNOWN_BETTER = 6, 0.7, 0.05
 # Parameters of a classical core.
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
@@ -197,6 +201,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if engine.part is None:
         engine, best = _without_start(begin, engine, best, found)
     engine, best = _without_drowned(begin, engine, best, found, seed)
+    engine, best = _without_known(begin, engine, best, seed)
     stages.enter("judging what was found", JUDGED)
     judged = with_rival(judge(engine, best, found, shown, noise_std), rival)
     if orientation:
@@ -455,6 +460,32 @@ def _without_drowned(begin, engine, best, found, seed):
     other.spikes, other.aside = engine.spikes | shown, engine.aside & ~hidden
     other.drowned = hidden
     return other, other.run(seed)
+
+
+def _without_known(begin, engine, best, seed):
+    """Engine whose fits see the sensor without what the record shows by itself of each sample, such
+    as how old a value is that was polled, and its best set; those given where there is nothing."""
+    first = engine, best
+    for _ in range(_KNOWN_AGAIN):
+        p = engine.problem
+        if isinstance(p, Stretches) or p.limit.ends_search(
+                "nothing was looked for beside what is known of each sample"):
+            break
+        fit = best if engine.part is None else engine.on_whole(best)
+        known = added(engine, fit)
+        least = _KNOWN if engine is first[0] else _KNOWN_BETTER
+        if np.std(known[p.used]) <= least * np.std(fit.residual[p.used]):
+            break
+        record, *rest = begin.args
+        begin = functools.partial(begin.func, engine.record.without(p.axis, known), *rest,
+                                  **begin.keywords)
+        other = _beside(begin, engine, np.zeros(len(engine.wanted), bool))
+        other.drowned, best = engine.drowned, other.run(seed)
+        engine = other
+    if engine is not first[0] and not by_sample(
+            engine, best if engine.part is None else engine.on_whole(best)).any():
+        return first  # what was known does not show beside this set
+    return engine, best
 
 
 def _without_start(begin, engine, best, found):

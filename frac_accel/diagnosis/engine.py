@@ -4,8 +4,7 @@ import dataclasses
 import functools
 
 import numpy as np
-from scipy.fft import dct, rfft
-from scipy.ndimage import uniform_filter1d
+from scipy.fft import dct
 
 from ..budget import Division, established_noise
 from ..errors import FracAccelError
@@ -17,6 +16,7 @@ from ..model.effects.base import CROSS_AXIS
 from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
+from .noise_colour import lead, noise_peak
 from .other_axes import UNLIKE
 from .problem import Problem, acts_on_spring
 from .search import Search
@@ -39,10 +39,14 @@ _PARTED = 40_000
 _PARTS = 5
 # Causes that the whole of a long record may add to those of its part.
 _SLOW = 2
-# Variances of the noise within which two sets that say nearly the same count as equal.
-_CLOSE = 30.0
-# And by which another cause must be ahead to say more than a parameter of the model in use.
+# Variances of the noise within which two sets that say nearly the same count as equal, and beyond
+# which they are not compared more closely.
+_CLOSE, _FAR = 30.0, 1000.0
+# And by which another set must be ahead in noise that has a colour, or another cause to say more
+# than a parameter of the model in use.
 _AHEAD = 10.0
+# Largest density of noise, over its mean, from which on it has a colour.
+_COLOURED = 3.0
 # Standard uncertainties, and share of its size, by which a parameter may differ between halves.
 _AGREE = 5.0
 _ALIKE = 0.1
@@ -73,13 +77,6 @@ _COARSE = 0.2
 _ERRS_THERE = 0.5
 # Error of a simulation, and of values put on other instants, over the output's spread.
 _SIMULATED, _RESAMPLED = 3e-5, 1e-4
-
-
-def noise_peak(residual, used):
-    """Largest density of a residual's smoothed spectrum, over its mean: 1 for white noise."""
-    power = np.abs(rfft(residual))**2
-    smooth = uniform_filter1d(power, max(5, len(power) // 64), mode="reflect")
-    return float(max(smooth.max() / smooth.mean(), 1.0))
 
 
 def _mixes_otherwise(fit, best):
@@ -212,11 +209,6 @@ class Engine:
         """Cost with a penalty for each parameter, in units of the noise's variance."""
         return fitted.cost / variance + _CHANCE * fitted.size
 
-    def _evidence(self, fitted, variance):
-        """As `score`, by what was fitted only: that more kinds of a cause were tried makes another
-        one that fits worse no better."""
-        return fitted.cost / variance + _CHANCE * fitted.varied
-
     def compete(self, best, unwanted=frozenset()):
         """Let every cause's nearest rivals take its place; the winner of all without some."""
         for _ in range(4):
@@ -234,8 +226,7 @@ class Engine:
                 self.search.fit_all([self.search.begun(less, rival, begin) for _, rival, begin in
                                      self.search.screen(less)[:_RIVALS] if rival != cause]
                                     + [best.effects])
-            variance = best.cost / self.problem.count \
-                * noise_peak(best.residual, self.problem.used)
+            variance = self._variance(best)
             for rival in [fit for fit in self.search.fits.values()
                           if _mixes_otherwise(fit, best) and abs(
                               self.score(fit, variance) - self.score(best, variance)) < _SAME]:
@@ -245,7 +236,7 @@ class Engine:
                            if len(fit.effects) <= len(best.effects)
                            and not fit.causes & unwanted),
                           key=lambda fit: self.score(fit, variance))
-            winner = self._general(near, variance)
+            winner = self._ahead_in_colour(near, self._general(near, variance), variance)
             if winner is best:
                 return best
             best = winner
@@ -259,6 +250,22 @@ class Engine:
         limit = self.score(first, variance) + _CLOSE
         return next((fit for fit in near[1:] if self.score(fit, variance) < limit
                      and not self.hollow(fit)), first)
+
+    def _ahead_in_colour(self, near, winner, variance):
+        """Of the sets that are as near as a winner in white noise, the one that is ahead in noise
+        of the colour that there is: what is quiet beside loud noise hardly shows in a score."""
+        close = sorted((fit for fit in near if fit is not winner and not fit.rough
+                        and fit.cost < winner.cost + _CLOSE * variance),
+                       key=lambda fit: self.score(fit, winner.cost / self.problem.count))
+        close = [(self._margin(fit, winner, variance), fit) for fit in close[:2 * _RIVALS]
+                 if not self.hollow(fit) and self._leave_coloured_noise(fit, winner)]
+        margin, ahead = min(close, key=lambda entry: entry[0], default=(0.0, winner))
+        return ahead if margin < -_AHEAD else winner
+
+    def _leave_coloured_noise(self, *fits):
+        """Whether all of some fits leave what has a colour, and one of them nothing but noise."""
+        return all(noise_peak(fit.residual, self.problem.used) > _COLOURED for fit in fits) \
+            and not all(map(self.structure, fits))
 
     def hollow(self, fitted):
         """Whether a cause of a fit lies at the end of what was searched, or is, within its
@@ -322,7 +329,7 @@ class Engine:
         """Sets without a cause, no larger than the best, by score; (margin, causes)."""
         if self.comparing(cause) is not self:
             return self.part.rivals(self.part.best, cause)
-        variance = best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
+        variance = self._variance(best)
         found = [(self._margin(fit, best, variance), fit.causes) for fit in
                  self.search.fits.values()
                  if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
@@ -332,18 +339,34 @@ class Engine:
 
     def margin_of_all(self, best, cause):
         """Margin by which a set is ahead of one that leaves twice the power; what is left and is no
-        noise counts as if it were white: it may be any."""
+        noise counts as if it were white: it may be any. Noise of a colour is compared as such."""
         engine = self.comparing(cause)
         fitted = best if engine is self else engine.best
-        peak = 1.0 if engine.structure(fitted) else noise_peak(fitted.residual, engine.problem.used)
-        return engine.problem.count / peak
+        peak = noise_peak(fitted.residual, engine.problem.used)
+        return engine.problem.count / (
+            1.0 if peak > _COLOURED or engine.structure(fitted) else peak)
+
+    def in_colour(self, best, cause):
+        """Whether a cause meets its rivals in noise of a colour."""
+        engine = self.comparing(cause)
+        return engine._leave_coloured_noise(best if engine is self else engine.best)
+
+    def margin(self, rival, best):
+        """Variances of the noise by which a set is ahead of its rival."""
+        return self._margin(rival, best, self._variance(best))
+
+    def _variance(self, best):
+        """Variance of white noise as loud as the loudest that a set leaves."""
+        return best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
 
     def _margin(self, rival, best, variance):
         """Variances of the noise by which a set is ahead of its rival; no lead of a rival that has
         only come from a choice among more kinds of a cause."""
-        margin = self._evidence(rival, variance) - self._evidence(best, variance)
-        return margin if margin >= 0 else min(
-            self.score(rival, variance) - self.score(best, variance), 0.0)
+        ahead = (rival.cost - best.cost) / variance
+        if ahead < _FAR and not rival.rough and self._leave_coloured_noise(best, rival):
+            ahead = lead(best, rival, self.problem.used)
+        margin = ahead + _CHANCE * (rival.varied - best.varied)
+        return margin if margin >= 0 else min(ahead + _CHANCE * (rival.size - best.size), 0.0)
 
     def comparing(self, cause):
         """The engine in which a cause has met its rivals: that of a long record's part, or this."""
@@ -441,6 +464,14 @@ class Engine:
             return _once(self._budgets, fitted,
                          lambda fitted: self.budget_between(p.measured, fitted.output, valid))
         return self.budget_between(p.measured, fitted.output, valid & ~p.taken(hidden))
+
+    def budget_shown(self, fitted, hidden=None):
+        """The same of the record as it is, with what was taken off it."""
+        p = self.problem
+        if p.record.taken_off is None:
+            return self.budget(fitted, hidden)
+        left_out = np.zeros(len(self.record), bool) if hidden is None else hidden
+        return self.budget_between(p.recorded, fitted.output, p.record.valid & ~p.taken(left_out))
 
     def budget_between(self, measured, simulated, rows):
         """`Budget` of what differs between two signals in some rows."""

@@ -10,7 +10,6 @@ from ..model import AXES, SensorModel
 from ..model.parameters import plain
 from ..shown import above
 from ..signals.thinning import close_up, legible, segment, thinned
-from .engine import noise_peak
 from .leftover import Leftover
 
 # Points of a signal, and samples of a spectrum's segments (half as many points).
@@ -117,12 +116,12 @@ class Evidence:
         """
         search, p = engine.search, engine.problem
         outputs, residuals = _compared(engine, fitted, named)
-        measured = np.where(p.record.valid, p.measured, np.nan)
+        measured = np.where(p.record.valid, p.recorded, np.nan)
         rows, record = engine.held_out_rows, p.record
         length = close_up(record.reference[:, p.axis])
         signals = {"whole": _signals(p.time, {"measured": measured, **outputs}, residuals)}
         if len(p.time) > 2 * length:
-            part = strongest_stretch(np.where(p.used, p.measured, 0.0), length)
+            part = strongest_stretch(np.where(p.used, p.recorded, 0.0), length)
             signals["close_up"] = _signals(p.time, {"measured": measured, **outputs}, residuals,
                                            part)
         across = np.ptp(np.delete(record.reference, p.axis, axis=1), axis=0)
@@ -193,7 +192,9 @@ def _compared(engine, fitted, named):
             if effect.cause not in fitted.effects:
                 output = effect.simulate(output, p.simulator(p.axis).circumstances)
         outputs[EXTENDED], residuals[EXTENDED] = output, fitted.residual
-    return outputs, {name: np.where(p.used, values, np.nan) for name, values in residuals.items()}
+    off = p.recorded - p.measured
+    return outputs, {name: np.where(p.used, values + off, np.nan)
+                     for name, values in residuals.items()}
 
 
 def _signals(time, outputs, residuals, part=slice(None)):
@@ -208,13 +209,13 @@ def _density(p, residuals):
     def density(values):
         frequency, power = welch(np.nan_to_num(values), p.rate, "hann", size)
         return frequency, legible(np.sqrt(power / share))
-    frequency, output = density(np.where(p.used, p.measured, 0.0))
+    frequency, output = density(np.where(p.used, p.recorded, 0.0))
     return {"frequency_hz": legible(frequency), "output": output,
             "residual": {name: density(values)[1] for name, values in residuals.items()}}
 
 
 def _by_size(p, residuals):
-    size = np.abs(p.measured[p.used] - p.measured[p.used].mean())
+    size = np.abs(p.recorded[p.used] - p.recorded[p.used].mean())
     edges = np.r_[0.0, np.quantile(size, _CLASSES)]
     place = np.clip(np.searchsorted(edges, size, side="left") - 1, 0, len(_CLASSES) - 1)
     return _grouped(place, size, p, residuals)
@@ -240,11 +241,10 @@ def _grouped(place, values, p, residuals):
 def _rivals(engine, best):
     """The chosen set, those that describe the record best, and the model in use, as `Rival`."""
     search, samples = engine.search, engine.problem.count
-    variance = best.cost / samples * noise_peak(best.residual, engine.problem.used)
-    own, bare = engine.score(best, variance), search.baseline
+    bare = search.baseline
     others = sorted((fit for fit in search.fits.values()
                      if fit.causes not in (best.causes, bare.causes)), key=lambda fit: fit.cost)
     shown = [best, *others[:_MOST_RIVALS], *([bare] if bare is not best else [])]
     return [Rival(sorted(fit.causes - set(search.base)), len(fit.unknowns),
-                  float(np.sqrt(fit.cost / samples)), float(engine.score(fit, variance) - own),
+                  float(np.sqrt(fit.cost / samples)), float(engine.margin(fit, best)),
                   fit is best) for fit in shown]

@@ -74,6 +74,8 @@ def judge(engine, best, found, shown, noise_std=None):
         if any(effect_of(name).needs_temperature for name in instead):
             clear = max(clear, _AS_MEASURED * g.taken**2 * of_all * engine.problem.count
                         / best.cost)
+        # noise of a colour hides no lead
+        behind = -(_CLEAR if engine.in_colour(best, cause) else clear) / 2
         entry = Finding(best.effects[cause], stds[cause],
                         certainty(g) if alone else confidence(margin * _CLEAR / clear),
                         [*(instead if margin < 10 * _CLEAR else []), *([mirror] if mirror else [])],
@@ -82,7 +84,7 @@ def judge(engine, best, found, shown, noise_std=None):
             suspects.append(suspect({cause}, 0.0, doubts[cause]))
         elif margin > clear or (
                 best.effects[cause].everyday and instead and g.taken > _COMMON * most
-                and margin > -clear / 2
+                and margin > behind
                 and not any(effect_of(name).everyday for name in instead)):
             # of two that say the same, what is common; not what may only mend what another lacks
             findings.append(entry)

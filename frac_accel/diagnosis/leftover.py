@@ -66,6 +66,11 @@ class Leftover:
         return max(shares, default=0.0)
 
     @property
+    def only_grows(self):
+        """Whether all but little of what is no noise only comes and goes with the motion."""
+        return self.share > 0 and dataclasses.replace(self, level_score=0.0).share < _LEAST_GROWN
+
+    @property
     def noise_rms(self):
         """RMS of what may be noise [output units]."""
         return self.rms * np.sqrt(max(1 - self.share, 0.0))

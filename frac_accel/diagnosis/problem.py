@@ -199,6 +199,12 @@ class Problem:
         self._columns, self._mixings = {}, {}
 
     @property
+    def recorded(self):
+        """Measured values with what is known of each sample and was taken off, shape (n,)."""
+        off = self.record.taken_off
+        return self.measured if off is None else self.measured + off
+
+    @property
     def count(self):
         """Number of samples that count."""
         return int(self.used.sum())

@@ -178,9 +178,9 @@ class Seen:
         return refined(self.output, _FINE)
 
 
-def added(engine, fitted):
-    """What a fit's residual shows by itself, sample by sample, shape (n,): no noise, and nothing
-    that the motion makes."""
+def by_sample(engine, fitted):
+    """What the record shows by itself beside a fit, sample by sample, shape (n,): no noise, and
+    nothing that the motion makes."""
     p = engine.problem
     total = np.zeros(len(p.record))
     for _, _, reading in readings(engine, fitted, engine.found, {},
@@ -188,6 +188,12 @@ def added(engine, fitted):
         if reading.added is not None:
             total[p.coherent] += reading.added
     return total * p.used
+
+
+def added(engine, fitted):
+    """The same, of a fit's residual: without what was taken off the record."""
+    off = engine.problem.record.taken_off
+    return by_sample(engine, fitted) - (0.0 if off is None else off)
 
 
 def grows_with_motion(engine, fitted):
@@ -220,7 +226,7 @@ def readings(engine, fitted, found, shown, wanted=lambda cls: True):
     record = p.part(here)
     rows = record.valid.copy()
     rows[:64] = rows[-64:] = False
-    seen = Seen(record, found, p.axis, p.measured[here], fitted.output[here], rows,
+    seen = Seen(record, found, p.axis, p.recorded[here], fitted.output[here], rows,
                 rows & p.used[here], rows & p.taken(engine.spikes)[here],
                 engine.coarse_step(fitted) is not None, lambda: {
                     entry["part"]: entry["share"] for entry in engine.budget(fitted).parts

@@ -37,6 +37,9 @@ from .words import (
 _INCOMPLETE = ("unexplained", "partly_explained")
 # Share of the error that all else leaves up to which what is only suspected describes a record.
 _CLEARLY = 0.9
+# Standard uncertainties, and share of its size, within which a delay is what belongs to another
+# cause.
+_SAME_STDS, _SAME_SHARE = 5.0, 0.1
 # Times as much of the held-out data (RMS) as the model in use leaves, that names must not leave.
 _MISLED = 1.1
 # Share of what is left (power) that may be no noise in a record that counts as consistent, where so
@@ -87,6 +90,12 @@ class Named(NamedTuple):
         """Largest share of what is left (power) that may be no noise."""
         return max(engine.left(self.fitted).share, sum(share for share, _ in self.strange))
 
+    @property
+    def may_be_noise(self):
+        """Whether what is left may be noise that grows with the motion: nothing predicts it, and
+        no other cause is suspected."""
+        return self.left.only_grows and self.complete and not self.strange and not self.suspects
+
 
 class Described(NamedTuple):
     """The verdict; what stands in the model for what no cause explains (effects by cause), in words
@@ -134,7 +143,6 @@ def _named(engine, likely, shown_by, back):
     findings, fitted, stds, more = sure(
         engine, best, [f for f in likely.findings if f.cause not in back], likely.tied, beside,
         fraction)
-    unnamed = sorted(fitted.causes - {f.cause for f in findings} - engine.search.base.keys())
     complete = fitted.causes >= best.causes
     if not complete:
         fraction = remaining(engine, fitted, left.noise_rms)
@@ -145,7 +153,9 @@ def _named(engine, likely, shown_by, back):
     doubted = {**{cause: back[cause] for cause in sorted(back)}, **near, **other_course}
     suspects = [*likely.suspects, *more,
                 *(suspect({cause}, 0.0, words) for cause, words in doubted.items())]
-    findings = [*findings, *away, *(f for f in drifts if f.cause not in back), *shown_by(fitted)]
+    findings = _without_mean_delay(
+        [*findings, *away, *(f for f in drifts if f.cause not in back), *shown_by(fitted)])
+    unnamed = sorted(fitted.causes - {f.cause for f in findings} - engine.search.base.keys())
     # what was in doubt in a part of the record, or beside something else, is no suspect any more
     suspects = [each for each in suspects
                 if not {f.cause for f in findings}.issuperset(each["causes"])]
@@ -163,6 +173,17 @@ def _named(engine, likely, shown_by, back):
                  fraction, account, engine.structure(fitted))
 
 
+def _without_mean_delay(findings):
+    """Findings less a delay that is just what belongs to another one: it stays without a name."""
+    known = sum(f.effect.mean_delay_s() for f in findings)
+
+    def belongs(finding):
+        delay = finding.effect.pure_delay_s()
+        return bool(delay) and known and abs(delay - known) <= max(
+            _SAME_STDS * max(finding.std.values()), _SAME_SHARE * known)
+    return [f for f in findings if not belongs(f)]
+
+
 def _described(engine, named, sets):
     """`Described`, by what is only suspected in one of some sets of causes (`Fitted`)."""
     fitted, account, strange = named.fitted, named.account, named.strange
@@ -177,7 +198,8 @@ def _described(engine, named, sets):
         named.findings, [] if plain else named.suspects, named.complete,
         0.0 if plain else named.left.share, named.fraction, account.accounted,
         (strange and not plain) or account.faulty)
-    if verdict == "consistent" and hides_much(engine.record.beyond(engine.problem.axis)):
+    if verdict == "consistent" and hides_much(engine.record.beyond(engine.problem.axis)) \
+            or verdict in _INCOMPLETE and named.may_be_noise:
         verdict = "undecided"
     if not (verdict in _INCOMPLETE or (strange and not plain)):
         return Described(verdict, plain, {}, [], [], named.findings, account.after, None)
@@ -226,15 +248,18 @@ def _told(engine, likely, named, described, found):
     own = {f.cause: f.effect for f in findings}
     effects, late = _of_reference(engine, {**fitted.effects, **own, **described.effects}, own)
     model = _extended(engine, effects, _stated(p, fitted, after / account.spread))
-    fraction, floor = named.fraction, _noise_floor(named.left, noise, account)
-    if verdict == "consistent":
+    left, fraction = named.left, named.fraction
+    if verdict == "undecided" and named.may_be_noise:
+        left = dataclasses.replace(left, level_score=0.0)
+    floor = _noise_floor(left, noise, account)
+    if verdict == "consistent" or left is not named.left:
         fraction = 0.0  # nothing asks for an explanation
-    elif floor < named.left.noise_rms:
+    elif floor < left.noise_rms:
         fraction = remaining(engine, fitted, floor)
     # a model that has the limits leaves nothing there
     at_limit = engine.at_limit if any(f.effect.read_off for f in findings) else None
-    rest = engine.budget(fitted, at_limit) if output is None else \
-        engine.budget_between(p.measured, output, p.record.valid)
+    rest = engine.budget_shown(fitted, at_limit) if output is None else \
+        engine.budget_between(p.recorded, output, p.record.valid)
     others = p.others.shown_by(effects)
     findings = [_beside_unseen_core(others.said(f), delay_of_unseen_core(engine, fitted))
                 for f in findings]
@@ -243,24 +268,34 @@ def _told(engine, likely, named, described, found):
     if p.others.in_own_core:
         model, findings = in_own_core(model, findings, p.others.in_own_core, AXES[p.axis])
     reason = reason_of(verdict, account.share, noise, account.accounted, named.strange,
-                       engine.record.beyond(p.axis)) \
+                       named.may_be_noise, engine.record.beyond(p.axis)) \
         + set_aside(engine.aside, engine.drowned, engine.record.valid) \
         + description_words(described.words, named.unnamed, described.kept,
                             after / account.spread) \
         + hint_words(named.hint(engine) if described.plain and not named.strange else 0.0) \
+        + _known_words(engine, fitted, account) \
         + hidden_words(account.own, account.error) + late + _ahead(p, effects, own)
     return Diagnosis(
         verdict, reason,
         {"rmse": account.before, "nrmse": account.before / account.spread,
-         "noise_rms": floor or named.left.noise_rms},
+         "noise_rms": floor or left.noise_rms},
         findings, _once_each(named.suspects),
         {"rmse": after, "nrmse": after / account.spread},
         _by_itself(findings, fitted, floor, fraction) if verdict == "explained"
         else float(min(fraction, 1.0)), model, found,
         Evidence.of(engine, likely.best, fitted, own),
         noise.as_dict(), p.limit.summary(),
-        [*engine.budget(engine.search.baseline).as_list("baseline"),
+        [*engine.budget_shown(engine.search.baseline).as_list("baseline"),
          *rest.as_list("extended")])
+
+
+def _known_words(engine, fitted, account):
+    """Words for what is left but for what the record shows of each sample, which no model knows."""
+    p = engine.problem
+    if p.record.taken_off is None:
+        return ""
+    left = rms_of(p.measured - engine.learnt(fitted).output, engine.held_out_rows)
+    return f"; {left / account.spread:.2%} but for what the record shows of each sample by itself"
 
 
 def _once_each(suspects):
@@ -333,24 +368,26 @@ class Account(NamedTuple):
 
 def _account(engine, fitted, findings, noise):
     p, rest = engine.problem, engine.held_out_rows
-    spread = float(np.std(p.measured[rest]))
+    measured, off = p.recorded, engine.record.taken_off
+    off = np.zeros(len(engine.record)) if off is None else off
+    spread = float(np.std(measured[rest]))
     baseline = engine.search.baseline
-    before = rms_of(p.measured - baseline.output, rest)
+    before = rms_of(measured - baseline.output, rest)
     output = (baseline if fitted.causes == baseline.causes else engine.learnt(fitted)).output
     # what the record shows by itself was not fitted; some of it, such as limits, is simulated
     shown = [f for f in findings if f.effect.read_off and f.cause not in fitted.effects]
     for finding in shown:
         simulated = finding.effect.simulate(output, p.simulator(p.axis).circumstances)
         # rounded once more, values that noise or other instants have moved are farther off
-        if rms_of(p.measured - simulated, rest) < rms_of(p.measured - output, rest):
+        if rms_of(measured - simulated, rest) < rms_of(measured - output, rest):
             output = simulated
-    after = rms_of(p.measured - output, rest)
+    after = rms_of(measured - output, rest)
     by_itself = [f.gain.after for f in shown]
     own = engine.by_reference(fitted)
     # the record is all of it, not only the part that is held out
-    errors = p.errors(fitted)
+    errors = p.errors(fitted) + off
     whole, over = (rms_of(errors, engine.wanted & np.isfinite(errors)),
-                   float(np.std(engine.record.sensor[engine.wanted, p.axis])))
+                   float(np.std((engine.record.sensor[:, p.axis] + off)[engine.wanted])))
     error, of = max((after, spread), (whole, over), key=lambda pair: pair[0] / pair[1])
     # what is named may hide all else
     hidden = False if any(f.effect.read_off for f in findings) else engine.silent
@@ -398,7 +435,7 @@ def _by_curves(engine, fitted, after, named):
             simulated = p.simulate(more)
         except FracAccelError:
             continue
-        error = rms_of(p.measured - simulated, rest)
+        error = rms_of(p.recorded - simulated, rest)
         if found.is_worth_it and error < after:
             effects, output, after = more, simulated, error
             described.append(words)
@@ -423,10 +460,10 @@ def _kept(engine, named, widest, after):
     if len(slow) > 1:
         return None  # they cancel but for a free motion, which no model can have
     wider = engine.search.to_its_best(engine.search.fit({**more, **fitted.effects}))
-    errors = [(p.measured - engine.learnt(fit).output)[rest] for fit in (fitted, wider)]
-    error = rms_of(p.measured - wider.output, rest)
+    errors = [(p.recorded - engine.learnt(fit).output)[rest] for fit in (fitted, wider)]
+    error = rms_of(p.recorded - wider.output, rest)
     # a file says nothing of a free motion, which may do what its causes do not
-    written, before = (rms_of(p.measured - fit.simulated, rest) for fit in (wider, fitted))
+    written, before = (rms_of(p.recorded - fit.simulated, rest) for fit in (wider, fitted))
     better = gain(*errors)
     if not better.is_relevant or engine.hollow(wider) or written > _CLEARLY * max(after, before) \
             or max(error, rms_of(errors[1], slice(None))) > _CLEARLY * after:

@@ -46,7 +46,11 @@ def verdict_of(findings, suspects, complete, share, fraction, accounted, strange
     return "unexplained"
 
 
-def reason_of(verdict, nrmse, noise, accounted, strange, beyond=None):
+def reason_of(verdict, nrmse, noise, accounted, strange, grows, beyond=None):
+    if verdict == "undecided" and grows:
+        return (f"{nrmse:.1%} of the output is unaccounted for; it comes and goes with the motion, "
+                "and nothing predicts it: noise that grows with the motion, or an unknown cause; "
+                "repeat the same motion: what comes again is no noise" + beyond_words(beyond))
     if verdict == "undecided" and accounted and hides_much(beyond):
         return (f"the model explains the record up to {_percent(nrmse)} of the output where it is "
                 "compared, but there only; record the reference as fast as the sensor"

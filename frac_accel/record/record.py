@@ -78,6 +78,8 @@ class Record:
         Where reference and sensor each have a sample; None where only `valid` is known.
     unfiltered : ndarray, shape (n,), or None
         Reference of the axis that `comparable` has filtered, as it was before.
+    taken_off : ndarray, shape (n,), or None
+        What `without` took off the sensor's output on the diagnosed axis.
 
     Examples
     --------
@@ -104,6 +106,7 @@ class Record:
     since_start_s: float = 0.0
     present: tuple | None = None
     unfiltered: np.ndarray | None = None
+    taken_off: np.ndarray | None = None
 
     def __len__(self):
         return len(self.valid)
@@ -121,6 +124,7 @@ class Record:
             present=self.present and tuple(there[rows] for there in self.present),
             temperature_c=celsius,
             unfiltered=None if self.unfiltered is None else self.unfiltered[rows],
+            taken_off=None if self.taken_off is None else self.taken_off[rows],
             start_ns=self.start_ns + int(rows.start * 1e9 / self.sampling_rate_hz),
             since_start_s=self.since_start_s + rows.start / self.sampling_rate_hz)
 
@@ -148,6 +152,13 @@ class Record:
         # through, and against which a search tries filters (four times as long, the same answer)
         whole = signals[0][:, column] if "sensor" in self.resampled else guesses[column][0]
         return dataclasses.replace(self, reference=signals[0], sensor=signals[1], unfiltered=whole)
+
+    def without(self, column, known):
+        """The same without something known of each sample, shape (n,), on an axis, `column`."""
+        sensor = self.sensor.copy()
+        sensor[:, column] -= known
+        before = 0.0 if self.taken_off is None else self.taken_off
+        return dataclasses.replace(self, sensor=sensor, taken_off=before + known)
 
     def instants_of(self, which, column):
         """Mask, shape (n,): instants at which the sensor's value comes from some of its samples.

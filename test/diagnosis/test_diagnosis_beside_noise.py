@@ -74,3 +74,41 @@ def test_a_step_of_the_zero_beside_a_delay_that_moves(seed):
     found = named(sampled_pair(rng, (motion, sensor), FINER, RATE, 1e-3))
     assert found.keys() == {"offset_step"}
     assert found["offset_step"].effect.step == pytest.approx(step, rel=0.03)
+
+
+def of_one_over_f(rng, rms, corner_hz):
+    """Noise whose density goes with one over the frequency below a corner and is white above."""
+    frequency = np.fft.rfftfreq(FINER * COUNT, 1 / (FINER * RATE))
+    lines = np.fft.rfft(rng.normal(size=FINER * COUNT))
+    lines[1:] *= np.sqrt(1 + corner_hz / frequency[1:])
+    lines[0] = 0
+    noise = np.fft.irfft(lines)
+    return rms * noise / np.std(noise[::FINER])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_low_pass_above_the_band_beside_slow_noise(seed):
+    """A delay leaves more where little is left, which loud slow noise hid."""
+    rng = np.random.default_rng([54, seed])
+    motion = motion_of(rng, (1.0, 45.0))
+    corner_hz = rng.uniform(90, 150)
+    # the analogue filter's response, of a motion that repeats
+    u = 1j * np.fft.rfftfreq(len(motion), 1 / (FINER * RATE)) / corner_hz
+    sensor = np.fft.irfft(np.fft.rfft(motion) / (u**2 + np.sqrt(2) * u + 1), len(motion))
+    sensor = sensor + of_one_over_f(rng, 0.04, 40.0)
+    found = named(sampled_pair(rng, (motion, sensor), FINER, RATE, 1e-3))
+    assert found.keys() == {"low_pass_filter"}
+    value, std = found["low_pass_filter"].effect.corner_hz, \
+        found["low_pass_filter"].std["corner_hz"]
+    assert abs(value - corner_hz) < 4 * std < 0.05 * corner_hz
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_delay_beside_slow_noise(seed):
+    rng = np.random.default_rng([55, seed])
+    motion = motion_of(rng, (1.0, 45.0))
+    late = int(rng.integers(3, 3 * FINER))
+    sensor = np.r_[np.zeros(late), motion[:-late]] + of_one_over_f(rng, 0.04, 40.0)
+    found = named(sampled_pair(rng, (motion, sensor), FINER, RATE, 1e-3))
+    assert found.keys() == {"time_delay"}
+    assert found["time_delay"].effect.delay_s == pytest.approx(late / (FINER * RATE), rel=0.02)

@@ -5,6 +5,7 @@ import pytest
 
 from frac_accel.errors import IdentificationError
 from frac_accel.identification.response.excitation import (
+    held_out,
     persistent_excitation,
     require_excitation,
 )
@@ -32,3 +33,15 @@ def test_one_sine_stays_one(seed):
     assert persistent_excitation(sine, RATE)[0] == 2
     with pytest.raises(IdentificationError, match="excites only"):
         require_excitation(sine, RATE, 4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_record_that_ends_with_a_shock_is_judged_on_more_than_it(seed):
+    """It has two fifths of the energy and more, in a hundredth of the record."""
+    rng = np.random.default_rng(seed)
+    motion = rng.standard_normal(6000)
+    strike = slice(-int(rng.integers(20, 60)), None)
+    motion[strike] *= np.sqrt(rng.uniform(1.0, 3.0) * 6000 / -strike.start)
+    judged = held_out(motion)
+    assert 0.2 < judged.mean() < 0.8
+    assert 0.2 < judged[strike].mean() < 0.8

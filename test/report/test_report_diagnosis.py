@@ -103,8 +103,12 @@ def test_figures_show_both_models_against_the_true_noise(explained):
 @pytest.mark.parametrize("verdict, seed, causes, present, absent", [
     ("consistent", 19, (), ["does not differ from noise", "Model in use"],
      ["Extended model", "extended model", "Suspected"]),
-    ("unexplained", 7, ("gain_modulation",), ["no known cause", "stays unexplained"],
+    ("undecided", 7, ("gain_modulation",),
+     ["comes and goes with the motion", "repeat the same motion"],
      ["Extended model", "does not differ from noise"]),
+    ("unexplained", 7, ("duffing_mount",),
+     ["no known cause", "a fitted filter, which describes a part of it"],
+     ["does not differ from noise"]),
     ("partly_explained", 4, ("clipping",),
      ["clipping lower", "clipping upper", "stays unexplained", "experiment that tells",
       "Suspected, not named: offset or time_delay: too weak to tell.",

@@ -18,9 +18,9 @@ _LINE_BINS = 8
 # excitation that have few.
 _FEW, _OF_SINES = 8, ("sine", "stepped_sine")
 # Share of the reference's energy that a held-out check learns from; RMS of the rest, over that of
-# the former, below which it is too quiet for a judgement; stretches of which every other is then
-# held out.
-_LEARN, _QUIET_END, STRETCHES = 0.6, 0.5, 20
+# the former, below which it is too quiet for a judgement, and share of the samples below which it
+# is too few; stretches of which every other is then held out.
+_LEARN, _QUIET_END, _FEW_SAMPLES, STRETCHES = 0.6, 0.5, 0.05, 20
 # Energy of a frequency before, over that after, below which it is new there; share of new energy
 # from which the record is a sweep; stretches of it, and samples that each and a spectrum's segment
 # have.
@@ -289,13 +289,14 @@ def held_out(reference, valid=None):
     """Which samples are not learnt from, but judged on, as a mask.
 
     The last ones, from where a share of the reference's energy has come. Where these are quiet, as
-    after a shock, or move at frequencies that come nowhere before, as in a sweep, every other
-    stretch. Only `valid` samples count, if given.
+    after a shock, or few, as where a record ends with one, or move at frequencies that come nowhere
+    before, as in a sweep, every other stretch. Only `valid` samples count, if given.
     """
     energy = _energy(reference, valid)
     last = np.arange(len(reference)) >= np.searchsorted(energy, _LEARN * energy[-1])
     moving = reference - reference.mean()
-    if np.std(moving[last]) < _QUIET_END * np.std(moving[~last]):
+    if np.std(moving[last]) < _QUIET_END * np.std(moving[~last]) \
+            or min(last.sum(), np.sum(~last)) < _FEW_SAMPLES * len(last):
         return alternating_stretches(reference, STRETCHES)
     if is_new(moving[~last], moving[last]):
         return alternating_stretches(reference, min(_OF_SWEEP, len(reference) // _SHORTEST))

@@ -356,6 +356,11 @@ class Effect:
         """Standard uncertainties by parameter that a record's stamps leave, whatever is fitted."""
         return {}
 
+    def mean_delay_s(self):
+        """Mean delay [s] that belongs to what this is, so that a cause which says just that has no
+        name beside it."""
+        return 0.0
+
     def pure_delay_s(self):
         """Time [s] by which this effect moves the signal as it is."""
         return 0.0

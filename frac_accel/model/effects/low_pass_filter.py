@@ -47,8 +47,10 @@ class LowPassFilter(Effect):
     def alternatives(self):
         others = [dataclasses.replace(self, order=order)
                   for order in (self.order - 1, self.order + 1) if _LEAST <= order <= _MOST]
-        return others + [dataclasses.replace(self, family=family)
-                         for family in _FAMILIES if family != self.family]
+        # the best of one family may be like none of the other that is near
+        return others + [dataclasses.replace(self, order=order, family=family)
+                         for family in _FAMILIES if family != self.family
+                         for order in range(_LEAST, _MOST + 1)]
 
     @classmethod
     def starts(cls, view):

@@ -55,6 +55,9 @@ class PolledReadout(Effect):
     interval_s: float = parameter("s", minimum=0, maximum=10, null=0.0)
     beat_hz: float = parameter("Hz", minimum=0, fixed=True)
 
+    def mean_delay_s(self):
+        return self.interval_s / 2
+
     @classmethod
     def recognised(cls, seen, shown):
         """The residual follows the slope by a lag that is a sawtooth of time."""

@@ -1,0 +1,63 @@
+"""Beside values that are polled, all else is found as if each had come at its own instant."""
+
+import numpy as np
+import pytest
+
+from frac_accel import diagnose
+from frac_accel.model import SensorModel
+from frac_accel.model.core import Gain
+
+RATE, COUNT, NOISE = 400.0, 10_000, 0.003
+
+
+def polled(rng, response):
+    """Reference and sensor, both of shape (n,): a sum of sines, exact at any instant, behind a
+    `response` (of frequencies [Hz]), sampled every so often and read at the stamps; the interval
+    [s], and the largest of the sines' frequencies."""
+    hz = rng.uniform(0.5, 70.0, 120)
+    lines = (rng.normal(size=120) + 1j * rng.normal(size=120)) / np.sqrt(120)
+    stamps = np.arange(COUNT) / RATE
+    interval_s = rng.uniform(1.4e-3, 2.7e-3)
+    taken = stamps - (stamps + rng.uniform(0, interval_s)) % interval_s
+
+    def at(instants, lines):
+        return np.real(np.exp(2j * np.pi * np.outer(instants, hz)) @ lines)
+    sensor = at(taken, lines * response(hz)) + NOISE * rng.normal(size=COUNT)
+    return (at(stamps, lines), sensor), interval_s
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_polled_values_are_explained(seed):
+    """A delay was suspected, and the verdict was that no cause explains the rest."""
+    rng = np.random.default_rng([61, seed])
+    pair, interval_s = polled(rng, np.ones_like)
+    found = diagnose(pair, SensorModel(Gain(1.0)), sampling_rate_hz=RATE, time_limit_s=100)
+    assert found.verdict == "explained"
+    finding, = found.findings
+    assert finding.cause == "polled_readout"
+    assert abs(finding.effect.interval_s - interval_s) < 4 * finding.std["interval_s"]
+    # the model can only have the mean age of a value
+    effects = {effect.cause: effect for effect in found.model.axis("x").effects}
+    assert effects["time_delay"].delay_s == pytest.approx(interval_s / 2, rel=0.01)
+    left = pair[1] - np.interp(np.arange(COUNT) / RATE - interval_s / 2,
+                               np.arange(COUNT) / RATE, pair[0])
+    assert found.extended["rmse"] == pytest.approx(np.std(left), rel=0.2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_low_pass_beside_polled_values(seed):
+    """The lag of their ages hid it."""
+    rng = np.random.default_rng([62, seed])
+    corner_hz = rng.uniform(60, 120)
+
+    def butterworth(hz):
+        u = 1j * hz / corner_hz
+        return 1 / (u**2 + np.sqrt(2) * u + 1)
+    pair, interval_s = polled(rng, butterworth)
+    found = diagnose(pair, SensorModel(Gain(1.0)), sampling_rate_hz=RATE, time_limit_s=100)
+    findings = {finding.cause: finding for finding in found.findings}
+    assert findings.keys() == {"polled_readout", "low_pass_filter"}
+    filtered = findings["low_pass_filter"]
+    assert filtered.effect.order == 2 and filtered.effect.family == "butterworth"
+    assert abs(filtered.effect.corner_hz - corner_hz) < 4 * filtered.std["corner_hz"] \
+        < 0.02 * corner_hz
