@@ -21,8 +21,9 @@ _LEVEL_SAMPLES = 50
 _PARTS = 20
 # Scale, of the residual's RMS, below which no scatter is believed (values on a lattice).
 _LEAST = 1e-3
-# Probability of as many bursts where much moves, below which it is no chance.
-_RELATED = 0.005
+# Probability of as many bursts where much moves, below which it is no chance, and share of their
+# power that those have which are looked at.
+_RELATED, _MATTERS = 0.005, 0.99
 
 # Tones at most, bins of the spectrum whose median is the floor, and what the highest of n bins of
 # noise exceeds its mean by more than ln n in 6 of a million records.
@@ -114,17 +115,22 @@ def bursts(values, motion, used):
     count = int(found.sum())
     if not count or count > _SHORT * used.sum():
         return np.zeros(len(values), bool)
-    return np.zeros(len(values), bool) if _where_much_moves(found, motion, used) else found
+    return np.zeros(len(values), bool) if _where_much_moves(found, size, motion, used) else found
 
 
-def _where_much_moves(found, motion, used):
+def _where_much_moves(found, size, motion, used):
     """Whether samples lie where much moves more often than chance would have it.
 
-    By Fisher's sum of the logarithms of the ranks from above, one of each group.
+    By Fisher's sum of the logarithms of the ranks from above, one of each group that matters: what
+    little stands out of noise that grows with the motion says nothing of strong bursts.
     """
     envelope = _envelope(motion)
     rows = np.flatnonzero(found)
     groups = np.split(rows, np.flatnonzero(np.diff(rows) > _WINDOW) + 1)
+    power = np.array([np.sum(size[group]**2) for group in groups])
+    order = np.argsort(-power)
+    most = 1 + int(np.searchsorted(np.cumsum(power[order]), _MATTERS * power.sum()))
+    groups = [groups[i] for i in order[:most]]
     middle = np.array([np.median(envelope[group]) for group in groups])
     above = 1 - np.searchsorted(np.sort(envelope[used]), middle) / (used.sum() + 1)
     return bool(gamma.sf(-np.sum(np.log(above)), len(groups)) < _RELATED)

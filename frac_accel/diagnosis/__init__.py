@@ -24,7 +24,7 @@ from ..record.clipping import at_limits
 from ..record.orientation import Orientation, turned_away
 from ..record.sources import pair_of
 from ..simulation import AxisSimulator
-from .courses import begun_with, beside, course_of, is_worth_it, refined
+from .courses import begun_with, beside, course_of, is_worth_it, law_instead, refined
 from .engine import Engine
 from .event import event, start
 from .finding import Diagnosis, Finding, insufficient
@@ -337,7 +337,12 @@ def _searched(begin, engine, seed):
     own_begin, other = _beside_a_course(begin, engine, courses, {})
     own_best = other.run(seed)
     if (other.part or other).noise_only(own_best):
-        return own_begin, other, own_best
+        law = law_instead(engine, own_best, courses)
+        if law is None:
+            return own_begin, other, own_best
+        best = engine.run(seed)
+        return (own_begin, other, own_best) if own_best.cost < best.cost \
+            else (begin, engine, best)
     best = engine.run(seed)
     return (own_begin, other, own_best) if is_worth_it(best, own_best, courses) \
         else (begin, engine, best)

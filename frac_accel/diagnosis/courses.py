@@ -63,11 +63,26 @@ def begun_with(engine):
 def _least_of_a_law(engine, effect):
     """Least cost of a law in time of a course's kind, beside all common causes."""
     search = engine.search
-    common = search.fit({**search.base, **search.everyday(search.baseline)})
+    fit = _with_a_law(engine, search.everyday(search.baseline), effect)
+    return np.inf if fit is None else fit.cost
+
+
+def law_instead(engine, best, courses):
+    """Fit with a law in time in the place of a course, beside all else that a set has, where that
+    leaves less; or None."""
+    (cause, effect), = courses.items()
+    fit = _with_a_law(engine, {c: e for c, e in best.effects.items() if c != cause}, effect)
+    return fit if fit is not None and fit.cost < best.cost else None
+
+
+def _with_a_law(engine, effects, effect):
+    """The best fit with a law in time of a course's kind, beside some effects; or None."""
+    search = engine.search
+    common = search.fit({**search.base, **effects})
     of_kind = set(search.candidates) - set(beside({effect.cause: effect}, search.candidates))
     fits = search.fit_all([search.begun(common, cause, begin) for _, cause, begin in
                            search.screen(common) if cause in of_kind])
-    return min((fit.cost for fit in fits), default=np.inf)
+    return min(fits, key=lambda fit: fit.cost, default=None)
 
 
 def course_of(engine, best):

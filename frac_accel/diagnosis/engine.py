@@ -60,6 +60,8 @@ _PART_AT_LEAST = 0.03
 # freedom), and of slow ones where its density grows with one over the frequency (0.11 to 0.49).
 _HEAVY_TAILS, _LONG_MEMORY = 0.3, 0.5
 _OF_NOISE = {"bursts": _HEAVY_TAILS, "slow": _LONG_MEMORY}
+# Parts that follow the motion.
+OF_MOTION = ("linear", "across", "even", "odd", "time_varying")
 # Share of what is left (power) within which a common cause says the same as a filter.
 _PLAINLY = 0.02
 # Share of what a set explains (power) that its core may leave to the others.
@@ -263,9 +265,10 @@ class Engine:
         return ahead if margin < -_AHEAD else winner
 
     def _leave_coloured_noise(self, *fits):
-        """Whether all of some fits leave what has a colour, and one of them nothing but noise."""
+        """Whether all of some fits leave what has a colour, and one of them nothing that follows
+        the motion: what wanders, tones and bursts are no more than loud where they are."""
         return all(noise_peak(fit.residual, self.problem.used) > _COLOURED for fit in fits) \
-            and not all(map(self.structure, fits))
+            and any(not any(part in OF_MOTION for _, part in self.structure(fit)) for fit in fits)
 
     def hollow(self, fitted):
         """Whether a cause of a fit lies at the end of what was searched, or is, within its
@@ -325,12 +328,16 @@ class Engine:
         return {cause: effect for cause, effect in effects.items()
                 if cause not in self.search.base}
 
-    def rivals(self, best, cause):
-        """Sets without a cause, no larger than the best, by score; (margin, causes)."""
+    def rivals(self, best, cause, may_be_more=False):
+        """Sets without a cause, no larger than the best, by score; (margin, causes).
+
+        Where what is left `may_be_more` than noise, of a lead that only shows where little is left
+        no more counts than the loudest noise would let show: it may favour either.
+        """
         if self.comparing(cause) is not self:
-            return self.part.rivals(self.part.best, cause)
+            return self.part.rivals(self.part.best, cause, may_be_more)
         variance = self._variance(best)
-        found = [(self._margin(fit, best, variance), fit.causes) for fit in
+        found = [(self._margin(fit, best, variance, may_be_more), fit.causes) for fit in
                  self.search.fits.values()
                  if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
         # a hollow one that is close says the same in other words
@@ -339,17 +346,11 @@ class Engine:
 
     def margin_of_all(self, best, cause):
         """Margin by which a set is ahead of one that leaves twice the power; what is left and is no
-        noise counts as if it were white: it may be any. Noise of a colour is compared as such."""
+        noise counts as if it were white: it may be any."""
         engine = self.comparing(cause)
         fitted = best if engine is self else engine.best
-        peak = noise_peak(fitted.residual, engine.problem.used)
-        return engine.problem.count / (
-            1.0 if peak > _COLOURED or engine.structure(fitted) else peak)
-
-    def in_colour(self, best, cause):
-        """Whether a cause meets its rivals in noise of a colour."""
-        engine = self.comparing(cause)
-        return engine._leave_coloured_noise(best if engine is self else engine.best)
+        peak = 1.0 if engine.structure(fitted) else noise_peak(fitted.residual, engine.problem.used)
+        return engine.problem.count / peak
 
     def margin(self, rival, best):
         """Variances of the noise by which a set is ahead of its rival."""
@@ -359,12 +360,14 @@ class Engine:
         """Variance of white noise as loud as the loudest that a set leaves."""
         return best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
 
-    def _margin(self, rival, best, variance):
+    def _margin(self, rival, best, variance, may_be_more=False):
         """Variances of the noise by which a set is ahead of its rival; no lead of a rival that has
         only come from a choice among more kinds of a cause."""
         ahead = (rival.cost - best.cost) / variance
         if ahead < _FAR and not rival.rough and self._leave_coloured_noise(best, rival):
-            ahead = lead(best, rival, self.problem.used)
+            in_colour = lead(best, rival, self.problem.used)
+            peak = variance * self.problem.count / best.cost
+            ahead = min(in_colour, max(ahead, in_colour / peak)) if may_be_more else in_colour
         margin = ahead + _CHANCE * (rival.varied - best.varied)
         return margin if margin >= 0 else min(ahead + _CHANCE * (rival.size - best.size), 0.0)
 

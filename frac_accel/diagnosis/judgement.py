@@ -63,7 +63,7 @@ def judge(engine, best, found, shown, noise_std=None):
     most = max((g.taken for g in gains.values()), default=0.0)
     for cause, g in gains.items():
         mirror = best.effects[cause].mirrors
-        rivals = [(margin, causes) for margin, causes in engine.rivals(best, cause)
+        rivals = [(margin, causes) for margin, causes in engine.rivals(best, cause, nearly > 0)
                   # what cannot be named does not stand in the way of what can
                   if (not mirror or mirror not in causes) and not causes & doubted.keys()]
         alone = engine.stands_alone(best, cause, g.taken)
@@ -74,8 +74,6 @@ def judge(engine, best, found, shown, noise_std=None):
         if any(effect_of(name).needs_temperature for name in instead):
             clear = max(clear, _AS_MEASURED * g.taken**2 * of_all * engine.problem.count
                         / best.cost)
-        # noise of a colour hides no lead
-        behind = -(_CLEAR if engine.in_colour(best, cause) else clear) / 2
         entry = Finding(best.effects[cause], stds[cause],
                         certainty(g) if alone else confidence(margin * _CLEAR / clear),
                         [*(instead if margin < 10 * _CLEAR else []), *([mirror] if mirror else [])],
@@ -84,7 +82,7 @@ def judge(engine, best, found, shown, noise_std=None):
             suspects.append(suspect({cause}, 0.0, doubts[cause]))
         elif margin > clear or (
                 best.effects[cause].everyday and instead and g.taken > _COMMON * most
-                and margin > behind
+                and margin > -clear / 2
                 and not any(effect_of(name).everyday for name in instead)):
             # of two that say the same, what is common; not what may only mend what another lacks
             findings.append(entry)

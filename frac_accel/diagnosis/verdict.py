@@ -10,10 +10,12 @@ from ..identification.fit.uncertainty import beyond_noise, noise_floor
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.core import Oscillator
 from ..model.effects import fault_of_reference
+from ..model.effects.base import STAMPS
 from . import courses
 from .doubts import delay_of_unseen_core, left_open, most_is_left, own_delay_s
 from .empirical import fit_empirical_link
 from .empirical_map import fit_empirical_map
+from .engine import OF_MOTION
 from .evidence import Evidence
 from .finding import Diagnosis
 from .gain import gain
@@ -44,10 +46,8 @@ _SAME_STDS, _SAME_SHARE = 5.0, 0.1
 _MISLED = 1.1
 # Share of what is left (power) that may be no noise in a record that counts as consistent, where so
 # little is left that it need not be noise; more of it where that is such a share of the output
-# (RMS) at most.
+# (RMS) at most; of parts that follow the motion: tones, bursts and what wanders are no hint.
 _HINT, _MUCH, _UNSEEN = 0.1, 0.3, 0.005
-# Parts of it that this holds for: tones, bursts and what wanders are no hint of anything.
-_OF_MOTION = ("linear", "across", "even", "odd", "time_varying")
 
 
 class Curves(NamedTuple):
@@ -190,7 +190,7 @@ def _described(engine, named, sets):
     # beside a model that leaves nothing that stands out, what is only suspected is chance, and a
     # hint of structure in what is left is no reason to call the record unexplained
     hint = named.hint(engine)
-    unrelated = [part for _, part in strange if part not in _OF_MOTION]
+    unrelated = [part for _, part in strange if part not in OF_MOTION]
     small = hint < _HINT or hint < _MUCH and np.sqrt(hint) * account.share < _UNSEEN
     plain = all(f.effect.read_off for f in named.findings) and not unrelated and (
         hint == 0 or account.accounted and small)
@@ -198,9 +198,11 @@ def _described(engine, named, sets):
         named.findings, [] if plain else named.suspects, named.complete,
         0.0 if plain else named.left.share, named.fraction, account.accounted,
         (strange and not plain) or account.faulty)
-    if verdict == "consistent" and hides_much(engine.record.beyond(engine.problem.axis)) \
-            or verdict in _INCOMPLETE and named.may_be_noise:
+    if verdict == "consistent" and hides_much(engine.record.beyond(engine.problem.axis)):
         verdict = "undecided"
+    if verdict in _INCOMPLETE and named.may_be_noise:
+        verdict = "explained" if account.accounted and any(
+            f.effect.stage != STAMPS for f in named.findings) else "undecided"
     if not (verdict in _INCOMPLETE or (strange and not plain)):
         return Described(verdict, plain, {}, [], [], named.findings, account.after, None)
     named_causes = {f.cause for f in named.findings}
@@ -249,7 +251,7 @@ def _told(engine, likely, named, described, found):
     effects, late = _of_reference(engine, {**fitted.effects, **own, **described.effects}, own)
     model = _extended(engine, effects, _stated(p, fitted, after / account.spread))
     left, fraction = named.left, named.fraction
-    if verdict == "undecided" and named.may_be_noise:
+    if verdict in ("explained", "undecided") and named.may_be_noise:
         left = dataclasses.replace(left, level_score=0.0)
     floor = _noise_floor(left, noise, account)
     if verdict == "consistent" or left is not named.left:

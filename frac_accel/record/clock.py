@@ -80,6 +80,10 @@ class Jump(NamedTuple):
     at_s: float
     size_s: float
 
+    def undone(self, seconds):
+        """Stamps [s] after the first one, shape (n,), of samples that go on evenly."""
+        return seconds - self.size_s * (seconds >= self.at_s)
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Clock:
@@ -141,8 +145,7 @@ class Clock:
         jump = _set_once(slot, seconds, late, slope)
         if jump is None:
             return cls("regular", rate, float(np.median(place)) / rate, slot, float(np.std(late)))
-        # the samples go on evenly
-        before = seconds - jump.size_s * (seconds >= jump.at_s)
+        before = jump.undone(seconds)
         slope, start = _line(slot, before)
         scatter = float(np.std(before - (slope * slot + start)))
         return cls("regular", float(1 / slope), float(start), slot, scatter, jump)
@@ -152,6 +155,11 @@ class Clock:
         if self.kind == "uneven":
             return (stamps_ns - stamps_ns[0]) * 1e-9
         return self.start_s + self.slot / self.rate_hz
+
+    def even_s(self, stamps_ns):
+        """Stamps [s] after the first of them, shape (n,), without a jump of theirs."""
+        seconds = (stamps_ns - stamps_ns[0]) * 1e-9
+        return seconds if self.jump is None else self.jump.undone(seconds)
 
     def independent_stamps(self, stamps_ns):
         """How many of its stamps scatter each for itself: one of each batch."""

@@ -70,7 +70,8 @@ def by_slots(one, two):
     """Pair topics of one clock sample by sample."""
     interval, rate = 1e9 / one.clock.rate_hz, one.clock.rate_hz
     start = int(one.stamps_ns[0])
-    places = [(topic.stamps_ns - start) / interval for topic in (one, two)]
+    places = [(topic.stamps_ns[0] - start + 1e9 * topic.clock.even_s(topic.stamps_ns)) / interval
+              for topic in (one, two)]
     slots = [topic.clock.slot + np.round(np.median(place - topic.clock.slot))
              for topic, place in zip((one, two), places)]
     # jitter averages out of the mean; a common clock offset between the two topics stays
