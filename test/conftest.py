@@ -19,7 +19,8 @@ THOROUGH = """
     blind_scoring budget command_fleet diagnosis_beside_noise diagnosis_companions
     diagnosis_courses diagnosis_high_pass diagnosis_in_bands diagnosis_laws
     diagnosis_noise_with_memory diagnosis_of_machines diagnosis_of_measured
-    diagnosis_on_the_road diagnosis_one_filter diagnosis_slow_motion diagnosis_soft_mount
+    diagnosis_on_the_road diagnosis_one_filter diagnosis_polled diagnosis_slow_motion
+    diagnosis_soft_mount
     diagnosis_sprung diagnosis_steps diagnosis_strong_spring diagnosis_truthful
     diagnosis_unbounded diagnosis_unequal_rates domains_agree empirical_link free_mass
     further_forces fuzz identify_general_equation keeper linear_causes long_records
@@ -46,8 +47,8 @@ SEEDS = """
     diagnosis_across diagnosis_beside_noise diagnosis_between_gaps diagnosis_companions
     diagnosis_courses diagnosis_high_pass diagnosis_in_bands diagnosis_like_axes
     diagnosis_of_instruments diagnosis_of_joints diagnosis_of_machines diagnosis_one_filter
-    diagnosis_out_of_sight diagnosis_scattered_instants diagnosis_settled diagnosis_sprung
-    diagnosis_sticking diagnosis_strong_spring
+    diagnosis_out_of_sight diagnosis_polled diagnosis_scattered_instants diagnosis_settled
+    diagnosis_sprung diagnosis_sticking diagnosis_strong_spring
 """.split()
 
 

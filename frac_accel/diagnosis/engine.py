@@ -5,6 +5,7 @@ import functools
 
 import numpy as np
 from scipy.fft import dct
+from scipy.ndimage import uniform_filter1d
 
 from ..budget import Division, established_noise
 from ..errors import FracAccelError
@@ -77,6 +78,8 @@ _COARSE = 0.2
 # RMS of the error of the model in use where it is judged, over that before, below which it errs
 # before.
 _ERRS_THERE = 0.5
+# Parts of a record by whose means an error is slow, and the share of it (RMS) that counts.
+_SLOW_PARTS, _ERRS_SLOWLY = 100, 0.2
 # Error of a simulation, and of values put on other instants, over the output's spread.
 _SIMULATED, _RESAMPLED = 3e-5, 1e-4
 
@@ -139,9 +142,12 @@ class Engine:
         reference = p.record.reference[:, p.axis]
         last = held_out(reference)
         error = self.search.baseline.residual
-        there, before = (np.std(error[p.used & rows]) for rows in (last, ~last))
-        return p.used & (last if there > _ERRS_THERE * before
-                         else alternating_stretches(reference, STRETCHES))
+        length = max(len(error) // _SLOW_PARTS, 1)
+        slow = uniform_filter1d(error, length)
+        slowly = np.std(slow[p.used & ~last]) > _ERRS_SLOWLY * np.std(error[p.used & ~last])
+        errs = all(np.std(values[p.used & last]) > _ERRS_THERE * np.std(values[p.used & ~last])
+                   for values in (error, *([slow] if slowly else [])))
+        return p.used & (last if errs else alternating_stretches(reference, STRETCHES))
 
     def threshold(self, fitted):
         """Cost by which a further parameter must improve on a fit."""

@@ -551,9 +551,11 @@ class Search:
         self._forget_worse(less, goal)
         found = next(iter(self.fit_all([less], fitted.cost, goal)), None)
         found = found or self.fit(less)
-        if goal < found.cost and fitted.effects[cause].pure_delay_s() \
-                and not any(map(acts_on_spring, less.values())):
-            # a filter of another order has another delay
+        gone = fitted.effects[cause]
+        if goal < found.cost and not any(map(acts_on_spring, less.values())) and (
+                gone.pure_delay_s() or gone.adds and any(
+                    effect.adds and effect.alternatives() for effect in less.values())):
+            # a filter of another order has another delay, and what settles elsewhere another zero
             found = self.varied(found)
         return found
 

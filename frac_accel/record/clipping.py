@@ -31,11 +31,13 @@ _BEYOND = 0.05
 
 
 class Pile(NamedTuple):
-    """Samples at the greatest value, their number, and the largest of the next values' numbers."""
+    """Samples at the greatest value, their number, and the largest of the next values' numbers; and
+    whether values that are held as long, elsewhere, are as many as its stays."""
 
     limit: float
     count: int
     next_count: int
+    is_held: bool
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,15 +83,24 @@ def pile_up(values):
         level = below.max()
         next_count = max(next_count, int(np.count_nonzero(below == level)))
         below = below[below < level]
-    return Pile(float(top), count, next_count) if count >= _PILE_UP * next_count else None
+    return Pile(float(top), count, next_count, _is_held(values, top)) \
+        if count >= _PILE_UP * next_count else None
+
+
+def _is_held(values, top):
+    """Whether values elsewhere stay the same for as long as at the top, as often as there."""
+    starts = np.flatnonzero(np.r_[True, np.diff(values) != 0])
+    lengths, there = np.diff(np.r_[starts, len(values)]), values[starts] == top
+    return bool(np.sum(lengths[~there] >= lengths[there].max()) >= there.sum())
 
 
 def certain(pile, step):
     """Limit of a pile that no model need confirm, or None.
 
-    On a lattice (of that step, if any) the tail falls from level to level.
+    On a lattice (of that step, if any) the tail falls from level to level, and a value that is held
+    may be any.
     """
-    if pile is None or (step and pile.count <= _CERTAIN * pile.next_count):
+    if pile is None or pile.is_held or (step and pile.count <= _CERTAIN * pile.next_count):
         return None
     return pile.limit
 

@@ -118,3 +118,22 @@ def test_a_gain_that_falls_with_the_level_does_not_drift(seed):
                           0.005)
     found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
     assert "gain_drift" not in {finding.cause for finding in found.findings}
+
+
+@pytest.mark.parametrize("fastest", [1.2e-3, 1.2e-4])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_zero_that_settles_beside_a_gain_that_drifts(seed, fastest):
+    """Beside the common causes alone, a course described it better than its law does; and it was
+    judged where it had settled, as the gain drifts on."""
+    rng = np.random.default_rng([63, seed])
+    drift, settles_s = -fastest * rng.uniform(0.5, 1.0), rng.uniform(20.0, 35.0)
+
+    def sensor(rng, motion, rate):
+        time = np.arange(len(motion)) / rate
+        return motion * (1 + drift * time) - 1.2 * np.exp(-time / settles_s)
+    found = diagnose(pair([65, seed], sensor), SensorModel(Gain(1.0)), time_limit_s=60)
+    findings = {finding.cause: finding for finding in found.findings}
+    assert findings.keys() == {"gain_drift", "warm_up_drift"}
+    settling = findings["warm_up_drift"]
+    assert abs(settling.effect.time_constant_s - settles_s) \
+        < 4 * settling.std["time_constant_s"] < 0.05 * settles_s

@@ -45,12 +45,12 @@ def test_what_is_hidden_is_named_and_nothing_else(name, causes):
 
 
 @pytest.mark.parametrize("name, besides", [
-    ("road_outside/wrong_model/0", set()), ("road_single/low_pass_filter/0", set()),
+    ("road_single/low_pass_filter/0", set()), ("road_outside/wrong_model/0", set()),
     ("road_single/linear_phase_filter/0",
      {"dropped_samples", "quantization", "timestamp_jitter"})])
 def test_a_filter_that_the_record_does_not_tell_from_others_has_no_name(name, besides):
-    # the model in use has a low-pass too many; a low-pass that is much like a moving average
-    # there; two moving averages that a Bessel filter of fourth order is as near to as the lattice
+    # a low-pass that is much like a moving average there; the model in use has a low-pass too many;
+    # two moving averages that a Bessel filter of fourth order is as near to as the lattice
     _, found = diagnosed(name)
     # scatter of the stamps by a hundredth of the interval gains about as little as counts at all
     # (0.5 %): rounding of the processor decides

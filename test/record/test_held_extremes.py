@@ -1,0 +1,35 @@
+"""A value held at an extreme is no limit, as others are held as long; a true limit is one."""
+
+import numpy as np
+import pytest
+
+from frac_accel.record.clipping import certain, pile_up
+
+
+def held(rng, step):
+    """A slow signal whose values stay for three to twelve samples."""
+    slow = np.cumsum(rng.normal(size=1500))
+    slow -= np.linspace(slow[0], slow[-1], len(slow))
+    values = np.repeat(slow, rng.integers(3, 13, len(slow)))
+    return step * np.round(values / step) if step else values
+
+
+@pytest.mark.parametrize("step", [None, 0.005])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_held_extreme_is_no_limit(seed, step):
+    rng = np.random.default_rng([141, seed])
+    values = held(rng, step)
+    # the greatest is held for longer than those next to it
+    top = values.max() + 1
+    values = np.r_[values, np.repeat([top - 0.5, top - 0.25, top, top - 0.25], [4, 3, 11, 3])]
+    assert pile_up(values)
+    assert certain(pile_up(values), step) is None
+
+
+@pytest.mark.parametrize("step", [None, 0.005])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_limit_of_held_values_is_one(seed, step):
+    rng = np.random.default_rng([142, seed])
+    values = held(rng, step)
+    limit = float(np.quantile(values, 0.9))
+    assert certain(pile_up(np.minimum(values, limit)), step) == limit
