@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import freqz, periodogram
 
 from ..model.effects import known_effects
-from ..record.resampling import filled, inner_taps
+from ..record.resampling import filled, inner_filter, inner_taps
 from ..signals.convolution import refined
 from .gain import gain
 from .leftover import rounding_errors
@@ -145,6 +145,32 @@ class Seen:
         if self.record.band_hz is not None and self.record.topics:
             return self._before_resampling()[1:]
         return self.measured[self.rows], self.output[self.rows], self.used[self.rows]
+
+    def on_own_clock(self):
+        """Values as they were recorded, the simulated output at their instants, which of them the
+        fit counted, all of shape (m,), their rate [Hz], and their places among the record's
+        instants; None where they have no uniform instants of their own, or some are missing."""
+        record = self.record
+        if any(topic.is_moved for topic in record.topics or ()) or self.is_uneven:
+            return None
+        if record.band_hz is None or not record.topics:
+            return (self.measured, self.output, self.used, record.sampling_rate_hz,
+                    np.arange(len(self.output)))
+        topic = record.topics[1]
+        good, values, output, used = self._before_resampling()
+        if np.any(np.diff(topic.clock.slot[good]) != 1):
+            return None
+        place = self._place(topic.clock.instants_s(topic.stamps_ns))[good]
+        return values, output, used, topic.clock.rate_hz, place
+
+    def at_instants(self, values, place):
+        """What some values of the sensor's own clock, at places, are at the record's instants,
+        shape (n,): within the band that is compared."""
+        record, count = self.record, len(self.output)
+        if record.band_hz is None:
+            return values
+        inside = inner_filter(record.sampling_rate_hz, record.band_hz, count)
+        return inside(np.interp(np.arange(count), place, values))
 
     def _before_resampling(self):
         """`as_recorded`, and which of the topic's samples they are."""

@@ -32,7 +32,7 @@ _BEYOND = 0.05
 
 class Pile(NamedTuple):
     """Samples at the greatest value, their number, and the largest of the next values' numbers; and
-    whether values that are held as long, elsewhere, are as many as its stays."""
+    whether its few stays are no longer than values are held elsewhere."""
 
     limit: float
     count: int
@@ -88,10 +88,12 @@ def pile_up(values):
 
 
 def _is_held(values, top):
-    """Whether values elsewhere stay the same for as long as at the top, as often as there."""
+    """Whether the top is reached a few times only, and values elsewhere stay the same for as long,
+    as often."""
     starts = np.flatnonzero(np.r_[True, np.diff(values) != 0])
     lengths, there = np.diff(np.r_[starts, len(values)]), values[starts] == top
-    return bool(np.sum(lengths[~there] >= lengths[there].max()) >= there.sum())
+    return bool(there.sum() < _FEWEST
+                and np.sum(lengths[~there] >= lengths[there].max()) >= there.sum())
 
 
 def certain(pile, step):

@@ -3,34 +3,35 @@
 import numpy as np
 import pytest
 
-from frac_accel import diagnose
+from frac_accel import Samples, diagnose
 from frac_accel.model import SensorModel
 from frac_accel.model.core import Gain
 
 RATE, COUNT, NOISE = 400.0, 10_000, 0.003
 
 
-def polled(rng, response):
-    """Reference and sensor, both of shape (n,): a sum of sines, exact at any instant, behind a
-    `response` (of frequencies [Hz]), sampled every so often and read at the stamps; the interval
-    [s], and the largest of the sines' frequencies."""
+def polled(rng, response, reference_hz=RATE):
+    """Values [(n,), (m,)] of reference and sensor at stamps [s]: a sum of sines, exact at any
+    instant, behind a `response` (of frequencies [Hz]), sampled every so often and read at the
+    stamps; these; and the interval [s]."""
     hz = rng.uniform(0.5, 70.0, 120)
     lines = (rng.normal(size=120) + 1j * rng.normal(size=120)) / np.sqrt(120)
     stamps = np.arange(COUNT) / RATE
+    others = np.arange(COUNT * reference_hz // RATE) / reference_hz
     interval_s = rng.uniform(1.4e-3, 2.7e-3)
     taken = stamps - (stamps + rng.uniform(0, interval_s)) % interval_s
 
     def at(instants, lines):
         return np.real(np.exp(2j * np.pi * np.outer(instants, hz)) @ lines)
     sensor = at(taken, lines * response(hz)) + NOISE * rng.normal(size=COUNT)
-    return (at(stamps, lines), sensor), interval_s
+    return (at(others, lines), sensor), (others, stamps), interval_s
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_polled_values_are_explained(seed):
     """A delay was suspected, and the verdict was that no cause explains the rest."""
     rng = np.random.default_rng([61, seed])
-    pair, interval_s = polled(rng, np.ones_like)
+    pair, _, interval_s = polled(rng, np.ones_like)
     found = diagnose(pair, SensorModel(Gain(1.0)), sampling_rate_hz=RATE, time_limit_s=100)
     assert found.verdict == "explained"
     finding, = found.findings
@@ -53,7 +54,7 @@ def test_a_low_pass_beside_polled_values(seed):
     def butterworth(hz):
         u = 1j * hz / corner_hz
         return 1 / (u**2 + np.sqrt(2) * u + 1)
-    pair, interval_s = polled(rng, butterworth)
+    pair, _, interval_s = polled(rng, butterworth)
     found = diagnose(pair, SensorModel(Gain(1.0)), sampling_rate_hz=RATE, time_limit_s=100)
     findings = {finding.cause: finding for finding in found.findings}
     assert findings.keys() == {"polled_readout", "low_pass_filter"}
@@ -61,3 +62,18 @@ def test_a_low_pass_beside_polled_values(seed):
     assert filtered.effect.order == 2 and filtered.effect.family == "butterworth"
     assert abs(filtered.effect.corner_hz - corner_hz) < 4 * filtered.std["corner_hz"] \
         < 0.02 * corner_hz
+
+
+@pytest.mark.parametrize("reference_hz", [260.0, 600.0])
+@pytest.mark.parametrize("seed", range(2))
+def test_polled_values_beside_a_reference_of_another_rate(seed, reference_hz):
+    """They were looked at as they are at the instants of the comparison, where they have no age."""
+    rng = np.random.default_rng([66, seed])
+    values, stamps, interval_s = polled(rng, lambda hz: np.full_like(hz, 1.1), reference_hz)
+    pair = [Samples.of(np.round(1e9 * each), np.outer(signal, [1.0, 0.0, 0.0]))
+            for each, signal in zip(stamps, values)]
+    found = diagnose(tuple(pair), SensorModel(Gain(1.0)), time_limit_s=100)
+    findings = {finding.cause: finding for finding in found.findings}
+    assert findings.keys() == {"polled_readout", "sensitivity_error"}
+    assert findings["polled_readout"].effect.interval_s == pytest.approx(interval_s, rel=0.01)
+    assert findings["sensitivity_error"].effect.gain == pytest.approx(1.1, rel=1e-3)

@@ -102,7 +102,7 @@ def test_what_a_free_motion_describes_is_in_no_model_file(is_written, monkeypatc
     wider = SimpleNamespace(effects={"ac_coupling": high_pass}, causes={"ac_coupling"},
                             output=described, simulated=described if is_written else -measured)
     engine = SimpleNamespace(
-        problem=SimpleNamespace(measured=measured,
+        problem=SimpleNamespace(recorded=measured,
                                 limit=SimpleNamespace(ends_judging=lambda words: False)),
         held_out_rows=np.arange(4000) % 1000 > 700, learnt=lambda fit: fit,
         search=SimpleNamespace(fit=lambda effects: wider, to_its_best=lambda fit: fit),

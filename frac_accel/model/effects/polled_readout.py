@@ -61,23 +61,26 @@ class PolledReadout(Effect):
     @classmethod
     def recognised(cls, seen, shown):
         """The residual follows the slope by a lag that is a sawtooth of time."""
+        own = seen.on_own_clock()
         # values between samples have no age; rounding of steady motion beats, too
-        if seen.found.jitter_rms_s or seen.is_coarse or any(
-                map(seen.record.is_on_other_instants, ("reference", "sensor"))):
+        if seen.found.jitter_rms_s or seen.is_coarse or own is None:
             return None
-        error = seen.measured - seen.output
-        beat = Beat.of(seen.measured, seen.output, seen.used)
+        measured, output, used, rate, place = own
+        beat = Beat.of(measured, output, used)
         if beat is None:
             return None
-        rate, own = seen.record.sampling_rate_hz, beat.own_rate
-        interval = 1 / own if own else beat.interval
-        words = f"{own * rate:.5g} Hz" if own else f"some {rate / interval:.2g} Hz"
+        interval = 1 / beat.own_rate if beat.own_rate else beat.interval
+        words = f"{beat.own_rate * rate:.5g} Hz" if beat.own_rate \
+            else f"some {rate / interval:.2g} Hz"
+        added = seen.at_instants(beat.added, place)
+        error = seen.measured - seen.output
         return cls(interval / rate, beat.frequency * rate), Reading(
             {"interval_s": beat.std / rate, "beat_hz": beat.frequency_std * rate},
-            error[seen.used], (error - beat.added)[seen.used],
+            error[seen.used], (error - added)[seen.used],
             f"a lag that runs through {1e3 * interval / rate:.3g} ms as a sawtooth, "
             f"{beat.frequency * rate:.4g} times a second, makes {beat.share:.0%} of the error: the "
-            f"sensor samples at {words}; {beat.steadiness}", added=beat.added)
+            f"sensor samples at {words}; {beat.steadiness}; on average a value is "
+            f"{1e3 * interval / rate / 2:.3g} ms old", added=added)
 
 
 class Beat(NamedTuple):
