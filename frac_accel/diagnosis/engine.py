@@ -372,8 +372,9 @@ class Engine:
         ahead = (rival.cost - best.cost) / variance
         if ahead < _FAR and not rival.rough and self._leave_coloured_noise(best, rival):
             in_colour = lead(best, rival, self.problem.used)
-            peak = variance * self.problem.count / best.cost
-            ahead = min(in_colour, max(ahead, in_colour / peak)) if may_be_more else in_colour
+            if in_colour is not None:
+                peak = variance * self.problem.count / best.cost
+                ahead = min(in_colour, max(ahead, in_colour / peak)) if may_be_more else in_colour
         margin = ahead + _CHANCE * (rival.varied - best.varied)
         return margin if margin >= 0 else min(ahead + _CHANCE * (rival.size - best.size), 0.0)
 

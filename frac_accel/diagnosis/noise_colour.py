@@ -28,10 +28,20 @@ def lead(ahead, behind, used):
 
     Returns
     -------
-    float
+    float or None
+        Twice what the half of the record shows that shows less of it; None where the halves
+        disagree: what happens once, as where a record starts, is all that is seen where little is
+        left otherwise.
     """
-    noise = np.minimum(*(_density(fit.residual * used) for fit in (ahead, behind)))
-    return _in_noise(behind, used, noise) - _in_noise(ahead, used, noise)
+    moving = np.cumsum(np.square(ahead.simulated - ahead.simulated.mean()) * used)
+    first = moving < moving[-1] / 2
+    halves = [_lead(ahead, behind, used & rows) for rows in (first, ~first)]
+    return 2 * min(halves, key=abs) if halves[0] * halves[1] > 0 else None
+
+
+def _lead(ahead, behind, rows):
+    noise = np.minimum(*(_density(fit.residual * rows) for fit in (ahead, behind)))
+    return _in_noise(behind, rows, noise) - _in_noise(ahead, rows, noise)
 
 
 def _density(values):
