@@ -116,6 +116,7 @@ def test_the_mounts_peak_is_not_the_sensors(seed):
     assert found.model.core.natural_frequency_hz == pytest.approx(own[0], rel=5e-3)
 
 
+@pytest.mark.long  # two to four minutes each
 @pytest.mark.parametrize("seed", [41, 42])
 def test_a_logger_without_phase_is_neither_a_resonance_nor_a_known_delay(seed):
     """The sensor's logger cuts at the end of what is compared: a peak named there was none, and

@@ -35,6 +35,7 @@ def found_in(rng, motion, sensor, frequency_hz, damping_ratio):
     return diagnose(pair, model)
 
 
+@pytest.mark.long  # two to four minutes each
 @pytest.mark.parametrize("seed", [1, 0])
 def test_another_sensor_that_is_plugged_in_is_no_step_of_gain(seed):
     """Its gain and its dynamics are others: `gain_step` and `time_step` were named. What they

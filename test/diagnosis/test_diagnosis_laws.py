@@ -75,6 +75,7 @@ def test_damping_by_another_power_of_the_speed_is_not_the_quadratic_one(seed, po
     assert not named(found) & {"quadratic_damping", "core_parameter_shift", "coulomb_friction"}
 
 
+@pytest.mark.long  # two to four minutes each
 @pytest.mark.parametrize("seed", [3521, 3522])
 def test_a_spring_by_the_fifth_power_has_no_hysteresis(seed):
     found = of_law(seed, 0.026, quintic=1.3e-7)
