@@ -24,7 +24,7 @@ from ..record.clipping import at_limits
 from ..record.orientation import Orientation, turned_away
 from ..record.sources import pair_of
 from ..simulation import AxisSimulator
-from .courses import begun_with, beside, course_of, is_worth_it, law_instead, refined
+from .courses import begun_with, beside, course_of, is_a_law, is_worth_it, refined
 from .engine import Engine
 from .event import event, start
 from .finding import Diagnosis, Finding, insufficient
@@ -337,8 +337,7 @@ def _searched(begin, engine, seed):
     own_begin, other = _beside_a_course(begin, engine, courses, {})
     own_best = other.run(seed)
     if (other.part or other).noise_only(own_best):
-        law = law_instead(engine, own_best, courses)
-        if law is None:
+        if not is_a_law(engine, own_best, courses):
             return own_begin, other, own_best
         best = engine.run(seed)
         return (own_begin, other, own_best) if own_best.cost < best.cost \
@@ -455,7 +454,7 @@ def _without_drowned(begin, engine, best, found, seed):
     happened once, drowns all else, and its best set; those given where there are none."""
     if engine.part is not None and is_nonlinear(best):
         return engine, best  # the whole of it would take too long
-    hidden = shown = drowned(engine, best if engine.part is None else engine.on_whole(best), found)
+    hidden = shown = drowned(engine, engine.on_whole(best), found)
     if not hidden.any() and engine.part is None and len(engine.record) == len(best.residual):
         hidden = event(best.residual, engine.problem.measured, engine.problem.used)
     if not hidden.any():
@@ -476,7 +475,7 @@ def _without_known(begin, engine, best, seed):
         if isinstance(p, Stretches) or p.limit.ends_search(
                 "nothing was looked for beside what is known of each sample"):
             break
-        fit = best if engine.part is None else engine.on_whole(best)
+        fit = engine.on_whole(best)
         known = added(engine, fit)
         least = _KNOWN if engine is first[0] else _KNOWN_BETTER
         if np.std(known[p.used]) <= least * np.std(fit.residual[p.used]):
@@ -487,8 +486,7 @@ def _without_known(begin, engine, best, seed):
         other = _beside(begin, engine, np.zeros(len(engine.wanted), bool))
         other.drowned, best = engine.drowned, other.run(seed)
         engine = other
-    if engine is not first[0] and not by_sample(
-            engine, best if engine.part is None else engine.on_whole(best)).any():
+    if engine is not first[0] and not by_sample(engine, engine.on_whole(best)).any():
         return first  # what was known does not show beside this set
     return engine, best
 

@@ -67,12 +67,12 @@ def _least_of_a_law(engine, effect):
     return np.inf if fit is None else fit.cost
 
 
-def law_instead(engine, best, courses):
-    """Fit with a law in time in the place of a course, beside all else that a set has, where that
-    leaves less; or None."""
+def is_a_law(engine, best, courses):
+    """Whether a law in time in the place of a course, beside all else that a set has, leaves less.
+    """
     (cause, effect), = courses.items()
     fit = _with_a_law(engine, {c: e for c, e in best.effects.items() if c != cause}, effect)
-    return fit if fit is not None and fit.cost < best.cost else None
+    return fit is not None and fit.cost < best.cost
 
 
 def _with_a_law(engine, effects, effect):

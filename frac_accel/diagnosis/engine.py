@@ -121,7 +121,7 @@ class Engine:
         # limit, and those in which it drowns all else
         self.at_limit = self.drowned = np.zeros(len(record), bool)
         self._learnt, self._budgets, self._structures, self._left = {}, {}, {}, {}
-        self._audible = {}
+        self._audible, self._peaks = {}, {}
         # what the numerics may still be wrong by: of the simulation, and of other instants
         self.floor = (_RESAMPLED if record.resampled else _SIMULATED) \
             * float(np.std(record.sensor[used, axis]))
@@ -153,7 +153,7 @@ class Engine:
         """Cost by which a further parameter must improve on a fit."""
         left = self.problem.count
         variance = fitted.cost / left
-        return max(_CHANCE * variance * noise_peak(fitted.residual, self.problem.used),
+        return max(_CHANCE * variance * self._peak(fitted),
                    self.floor**2 * left)
 
     def promises(self, fitted, cost):
@@ -210,8 +210,8 @@ class Engine:
         return best if dated == best.effects else self.search.again(dated)
 
     def on_whole(self, fitted):
-        """A set as a part of a long record has shown it, fitted to the whole."""
-        return self.search.fit(self._beside_base(fitted.effects))
+        """A set as a part of a long record has shown it, fitted to the whole; else as it is."""
+        return fitted if self.part is None else self.search.fit(self._beside_base(fitted.effects))
 
     def score(self, fitted, variance):
         """Cost with a penalty for each parameter, in units of the noise's variance."""
@@ -273,7 +273,7 @@ class Engine:
     def _leave_coloured_noise(self, *fits):
         """Whether all of some fits leave what has a colour, and one of them nothing that follows
         the motion: what wanders, tones and bursts are no more than loud where they are."""
-        return all(noise_peak(fit.residual, self.problem.used) > _COLOURED for fit in fits) \
+        return all(self._peak(fit) > _COLOURED for fit in fits) \
             and any(not any(part in OF_MOTION for _, part in self.structure(fit)) for fit in fits)
 
     def hollow(self, fitted):
@@ -355,16 +355,19 @@ class Engine:
         noise counts as if it were white: it may be any."""
         engine = self.comparing(cause)
         fitted = best if engine is self else engine.best
-        peak = 1.0 if engine.structure(fitted) else noise_peak(fitted.residual, engine.problem.used)
+        peak = 1.0 if engine.structure(fitted) else engine._peak(fitted)
         return engine.problem.count / peak
 
     def margin(self, rival, best):
         """Variances of the noise by which a set is ahead of its rival."""
         return self._margin(rival, best, self._variance(best))
 
+    def _peak(self, fitted):
+        return _once(self._peaks, fitted, lambda fit: noise_peak(fit.residual))
+
     def _variance(self, best):
         """Variance of white noise as loud as the loudest that a set leaves."""
-        return best.cost / self.problem.count * noise_peak(best.residual, self.problem.used)
+        return best.cost / self.problem.count * self._peak(best)
 
     def _margin(self, rival, best, variance, may_be_more=False):
         """Variances of the noise by which a set is ahead of its rival; no lead of a rival that has
@@ -424,7 +427,7 @@ class Engine:
                                          np.diag(by_blocks(slopes, residual)),
                                          np.zeros(slopes.shape[1])], axis=0))
         result = {}
-        peak = noise_peak(fitted.residual, used)
+        peak = self._peak(fitted)
         for unknown, std in zip(fitted.unknowns, stds):
             if unknown.jumps:
                 std = self.problem.jump_std(fitted, unknown, peak)

@@ -8,7 +8,7 @@ from scipy.ndimage import uniform_filter1d
 _SMOOTH, _LINES = 1 / 64, 5
 
 
-def noise_peak(residual, used):
+def noise_peak(residual):
     """Largest density of a residual's smoothed spectrum, over its mean: 1 for white noise."""
     density = _density(residual)
     return float(max(density.max() / density.mean(), 1.0))

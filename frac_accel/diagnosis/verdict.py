@@ -251,10 +251,11 @@ def _told(engine, likely, named, described, found):
     effects, late = _of_reference(engine, {**fitted.effects, **own, **described.effects}, own)
     model = _extended(engine, effects, _stated(p, fitted, after / account.spread))
     left, fraction = named.left, named.fraction
-    if verdict in ("explained", "undecided") and named.may_be_noise:
+    counts_as_noise = verdict in ("explained", "undecided") and named.may_be_noise
+    if counts_as_noise:
         left = dataclasses.replace(left, level_score=0.0)
     floor = _noise_floor(left, noise, account)
-    if verdict == "consistent" or left is not named.left:
+    if verdict == "consistent" or counts_as_noise:
         fraction = 0.0  # nothing asks for an explanation
     elif floor < left.noise_rms:
         fraction = remaining(engine, fitted, floor)
