@@ -107,6 +107,9 @@ def test_it_shows_what_the_corrector_says_and_quits_cleanly(tmp_path):
                 qos_overrides=reliable("/imu/data_raw"))), \
             Terminal(environment) as shown, Terminal(environment, "rear") as other:
         publisher = probe.publisher(Imu, "/imu/data_raw")
+        said = probe.metrics("/corrector/metrics")
+        # it may take long to start
+        shown.until("/imu/data_raw")
         with background(publish, [(publisher, messages)], RATE_HZ):
             # once two seconds of it are in the window
             probe.until(lambda: probe.statuses, "no status")
@@ -119,10 +122,12 @@ def test_it_shows_what_the_corrector_says_and_quits_cleanly(tmp_path):
             assert float(row[1]) == pytest.approx(size, rel=0.15)
             assert float(row[3]) == pytest.approx(after, rel=0.15)
             assert len(row[2]) >= 3
-            assert float(row[4]) == pytest.approx(RATE_HZ, rel=0.2)
-            assert float(row[5]) < 1000
-            status = probe.statuses[-1].message
-            assert status.split()[0] == row[6]
+            # on a busy machine messages come late, or have all come
+            probe.until(lambda: any(
+                float(row[4]) == pytest.approx(float(values["received_per_s"]), rel=0.01)
+                and float(row[5]) == pytest.approx(1e3 * float(values["latency_p99_s"]), rel=0.01)
+                for _, values in said), lambda: (row[0], said))
+            assert row[6] in {status.message.split()[0] for status in probe.statuses}
             other.until("waiting for rear: the raw topics .* are /imu/data_raw")
             assert other.end(b"\x03") == (0, True)
         assert shown.end(b"q") == (0, True)
