@@ -48,7 +48,7 @@ SEEDS = """
     diagnosis_courses diagnosis_high_pass diagnosis_in_bands diagnosis_like_axes
     diagnosis_of_instruments diagnosis_of_joints diagnosis_of_machines diagnosis_one_filter
     diagnosis_out_of_sight diagnosis_polled diagnosis_scattered_instants diagnosis_settled
-    diagnosis_sprung diagnosis_sticking diagnosis_strong_spring
+    diagnosis_sprung diagnosis_sticking diagnosis_strong_spring diagnosis_turned
 """.split()
 
 

@@ -243,7 +243,7 @@ def _in_axes_of_reference(record, source, axis, temperature, model):
     """The record of a sensor whose axis follows another one, turned; its topics, `Orientation`
     (None where it was not turned), and words."""
     orientation = _orientation(record, model)
-    if orientation is None:
+    if orientation is None or orientation.is_against_constants(record):
         return record, source, None, []
     opposes = orientation.opposes(axis, -1 if model and _inverts(model.axis(axis)) else 1)
     if model and opposes and not orientation.upside_down:

@@ -149,7 +149,8 @@ class Seen:
     def on_own_clock(self):
         """Values as they were recorded, the simulated output at their instants, which of them the
         fit counted, all of shape (m,), their rate [Hz], and their places among the record's
-        instants; None where they have no uniform instants of their own, or some are missing."""
+        instants; None where they have no uniform instants of their own. None counts that is
+        missing."""
         record = self.record
         if any(topic.is_moved for topic in record.topics or ()) or self.is_uneven:
             return None
@@ -158,10 +159,13 @@ class Seen:
                     np.arange(len(self.output)))
         topic = record.topics[1]
         good, values, output, used = self._before_resampling()
-        if np.any(np.diff(topic.clock.slot[good]) != 1):
-            return None
+        slot = topic.clock.slot[good].astype(int)
+        every = np.arange(slot[0], slot[-1] + 1)
+        there = np.zeros(len(every), bool)
+        there[slot - slot[0]] = used
         place = self._place(topic.clock.instants_s(topic.stamps_ns))[good]
-        return values, output, used, topic.clock.rate_hz, place
+        return (*(np.interp(every, slot, one) for one in (values, output)), there,
+                topic.clock.rate_hz, np.interp(every, slot, place))
 
     def at_instants(self, values, place):
         """What some values of the sensor's own clock, at places, are at the record's instants,

@@ -276,7 +276,7 @@ def _told(engine, likely, named, described, found):
         + description_words(described.words, named.unnamed, described.kept,
                             after / account.spread) \
         + hint_words(named.hint(engine) if described.plain and not named.strange else 0.0) \
-        + _known_words(engine, fitted, account) \
+        + _known_words(engine, fitted, account, findings) \
         + hidden_words(account.own, account.error) + late + _ahead(p, effects, own)
     return Diagnosis(
         verdict, reason,
@@ -292,12 +292,16 @@ def _told(engine, likely, named, described, found):
          *rest.as_list("extended")])
 
 
-def _known_words(engine, fitted, account):
+def _known_words(engine, fitted, account, findings):
     """Words for what is left but for what the record shows of each sample, which no model knows."""
     p = engine.problem
-    if p.record.taken_off is None:
+    shown = [f.gain.after for f in findings
+             if f.effect.known_by_sample and f.cause not in fitted.effects]
+    if p.record.taken_off is not None:
+        shown = [rms_of(p.measured - engine.learnt(fitted).output, engine.held_out_rows)]
+    if not shown:
         return ""
-    left = rms_of(p.measured - engine.learnt(fitted).output, engine.held_out_rows)
+    left = min(shown)
     return f"; {left / account.spread:.2%} but for what the record shows of each sample by itself"
 
 

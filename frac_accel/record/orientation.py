@@ -22,6 +22,12 @@ _SIGNIFICANT = 3.0
 _SHOWN = 0.3
 # Share of an axis' power that the others must explain for it to be said that it follows them.
 _EXPLAINED = 0.2
+# Standard uncertainties within which a turn is none but of axes that are exchanged or reversed, and
+# how large [degrees] they may be.
+_AS_STRAIGHT, _STRAIGHT_DEG = 2.0, 0.25
+# Constants over the motion (RMS) from which they tell directions, and their direction cosines where
+# they point the same way, and where they do not.
+_LARGE, _ALONG, _ASTRAY = 2.0, 0.9, 0.5
 # Gain in what a mirrored sensor leaves, over what a turned one leaves, by which it is mirrored.
 _MIRRORED = 0.5
 
@@ -74,7 +80,17 @@ class Orientation:
         -------
         Orientation or None
         """
-        return _oriented(record)
+        found = _oriented(record)
+        return found and found._straightened()
+
+    def _straightened(self):
+        """With axes that are just exchanged or reversed where no more is known: what such axes
+        show, such as a lattice, is kept."""
+        if not self.turned_deg < _AS_STRAIGHT * min(self.angle_std_deg, _STRAIGHT_DEG) \
+                or not np.isfinite(self.rotation).all() \
+                or abs(np.linalg.det(self.nearest)) < 0.5:
+            return self
+        return dataclasses.replace(self, rotation=self.nearest + 0.0)
 
     @property
     def nearest(self):
@@ -127,6 +143,21 @@ class Orientation:
     def upside_down(self):
         """Whether two axes that move are reversed, as half a turn about the third reverses them."""
         return not self.mirrored and int(np.sum(np.diag(self.nearest)[self.moving] < 0)) == 2
+
+    def is_against_constants(self, record):
+        """Whether the constants of both, such as gravity, are far larger than the motion and point
+        the same way without the rotation, but not with it: motion that a filter delays by half a
+        period looks reversed, too."""
+        one, two = (values[record.valid].mean(axis=0)
+                    for values in (record.reference, record.sensor))
+        moves = [np.linalg.norm(values[record.valid].std(axis=0))
+                 for values in (record.reference, record.sensor)]
+        sizes = [np.linalg.norm(constant) for constant in (one, two)]
+        if min(size / max(move, 1e-300) for size, move in zip(sizes, moves)) < _LARGE:
+            return False
+        kept, turned = (float(constant @ two) / np.prod(sizes)
+                        for constant in (one, np.nan_to_num(self.rotation) @ one))
+        return kept > _ALONG and turned < _ASTRAY
 
     def turn(self, samples):
         """Samples of the sensor in the reference's axes.

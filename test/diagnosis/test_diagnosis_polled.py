@@ -77,3 +77,19 @@ def test_polled_values_beside_a_reference_of_another_rate(seed, reference_hz):
     assert findings.keys() == {"polled_readout", "sensitivity_error"}
     assert findings["polled_readout"].effect.interval_s == pytest.approx(interval_s, rel=0.01)
     assert findings["sensitivity_error"].effect.gain == pytest.approx(1.1, rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_polled_values_of_which_some_are_lost(seed):
+    """One lost message, or stamps off by microseconds, and no age was looked for."""
+    rng = np.random.default_rng([67, seed])
+    values, (others, stamps), interval_s = polled(rng, lambda hz: np.full_like(hz, 1.1), 600.0)
+    kept = np.sort(rng.permutation(COUNT)[20:])
+    stamps = stamps + rng.normal(0, 5e-6, COUNT)
+    pair = [Samples.of(np.round(1e9 * each), np.outer(signal, [1.0, 0.0, 0.0]))
+            for each, signal in ((others, values[0]), (stamps[kept], values[1][kept]))]
+    found = diagnose(tuple(pair), SensorModel(Gain(1.0)), time_limit_s=100)
+    findings = {finding.cause: finding for finding in found.findings}
+    assert findings.keys() == {"polled_readout", "sensitivity_error", "dropped_samples"}
+    assert findings["polled_readout"].effect.interval_s == pytest.approx(interval_s, rel=0.01)
+    assert findings["sensitivity_error"].effect.gain == pytest.approx(1.1, rel=1e-3)

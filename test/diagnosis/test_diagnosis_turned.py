@@ -81,3 +81,46 @@ def test_what_is_added_to_the_turned_signal_each_axis_has_its_share_of(tmp_path)
     assert np.allclose(turn @ [offset, 0, 0], added, atol=0.02)
     judged = validate(tuple(pair), model)
     assert judged.whole_nrmse == pytest.approx(found.extended["nrmse"], rel=0.2)
+
+
+def by_car(rng, rate_hz, seconds=120.0):
+    """Instants [s] at eight times a rate, and motion of a car with gravity in its own axes."""
+    t = np.arange(0, seconds, 1 / (8 * rate_hz))
+    band = butter(3, (0.26 * rate_hz, 0.42 * rate_hz), "band", fs=8 * rate_hz, output="sos")
+    motion = sosfiltfilt(band, rng.normal(size=(len(t), 3)), axis=0)
+    return t, motion / motion.std(axis=0) * [0.5, 0.4, 1.0] + [0, 0, GRAVITY]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_gravity_speaks_against_a_turn_that_a_filter_imitates(seed):
+    """Motion that a moving average turns round, since it is faster than its first notch, was that
+    of a sensor upside down, with 22 times the output left."""
+    rng = np.random.default_rng([2026, seed])
+    t, motion = by_car(rng, 50.0)
+    length = rng.integers(28, 36)  # at eight times the rate
+    late = np.cumsum(motion, axis=0)
+    averaged = (late[length:] - late[:-length]) / length
+    at = slice(length + 7, len(t), 8)
+    reference, sensor = motion[at], averaged[7::8][:len(t[at])]
+    sensor = sensor + rng.normal(0, 0.02, sensor.shape)
+    stamps = np.round(1e9 * t[at])[:len(sensor)]
+    found = diagnose((Samples.of(stamps, reference[:len(sensor)]), Samples.of(stamps, sensor)),
+                     axis="z", time_limit_s=60)
+    assert "misalignment" not in {finding.cause for finding in found.findings}
+    assert found.baseline["rmse"] < 3  # twice gravity where it was turned
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_axes_that_are_just_reversed_keep_their_lattice(seed):
+    """A turn by an angle that nothing shows made all values odd."""
+    rng = np.random.default_rng([2027, seed])
+    t, motion = by_car(rng, 50.0)
+    stamps = np.round(1e9 * t[::8])
+    step = rng.uniform(0.2, 0.4)
+    sensor = motion[::8] * [-1, 1, -1] + rng.normal(0, 0.01, (len(stamps), 3))
+    sensor = step * np.round(sensor / step)
+    found = diagnose((Samples.of(stamps, motion[::8]), Samples.of(stamps, sensor)), axis="z",
+                     time_limit_s=60)
+    findings = {finding.cause: finding.effect for finding in found.findings}
+    assert findings.keys() == {"misalignment", "quantization"}
+    assert findings["quantization"].step == pytest.approx(step)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from frac_accel.model.effects.polled_readout import Beat
+from frac_accel.model.effects.steady_beat import Start, SteadyBeat
 
 COUNT, RATE = 12_000, 200.0
 TIME = np.arange(COUNT) / RATE
@@ -77,3 +78,48 @@ def test_a_phase_that_wanders_has_no_false_precision(turns, seed):
     beat, off, _ = told(np.random.default_rng([73, seed]), 0.03, turns * interval)
     assert "wanders" in beat.steadiness and abs(off) < 3
     assert beat.frequency_std * COUNT > turns
+
+
+def phone(rng, lag, noise):
+    """A half minute of values at 100 Hz that are as old as a `lag` (of seconds) says [s], of motion
+    that is far louder at times, and the motion late by the mean of that."""
+    t = np.arange(3500) / 100
+    frequency = rng.uniform(0.3, 8.0, 40)
+    size, phase = rng.normal(size=40) / np.sqrt(40), rng.uniform(0, 2 * np.pi, 40)
+    louder = rng.uniform(8, 25)
+
+    def motion(t):
+        return (0.1 + np.exp(-((t - louder) / 5)**2)) * sum(
+            a * np.sin(2 * np.pi * f * t + p) for a, f, p in zip(size, frequency, phase))
+    age = lag(t)
+    values = motion(t - age)
+    return values + noise * values.std() * rng.normal(size=len(t)), motion(t - age.mean())
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_slow_beat_in_a_short_record(seed):
+    """As of two phones on a shaking table; it was looked for in stretches that are too short."""
+    rng = np.random.default_rng([73, seed])
+    interval, start = 1 / (100 + rng.uniform(1.2, 4.0)), rng.random()
+    values, output = phone(rng, lambda t: interval * ((t / interval + start) % 1),
+                           rng.uniform(0.02, 0.05))
+    beat = Beat.of(values, output, np.ones(len(values), bool))
+    assert beat.own_rate == pytest.approx(1 / (100 * interval), abs=4 * beat.frequency_std)
+    assert abs(beat.interval - 100 * interval) < 4 * beat.std + 0.1 * 100 * interval
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_lag_that_swings_and_noise_are_no_beat(seed):
+    rng = np.random.default_rng([74, seed])
+    swing = 2 * np.pi * rng.uniform(1.2, 4.0)
+    for lag in (lambda t: 0.005 * np.sin(swing * t), np.zeros_like,
+                lambda t: 0.003 * np.cumsum(rng.normal(size=len(t))) / np.sqrt(len(t))):
+        values, output = phone(rng, lag, rng.uniform(0.01, 0.05))
+        assert Beat.of(values, output, np.ones(len(values), bool)) is None
+
+
+def test_without_a_sample_near_a_jump_nothing_is_fitted():
+    values, output, interval = polled(np.random.default_rng(75), 0.01)
+    turn = TIME / interval % 1
+    start = Start((1 / (interval * RATE)) % 1, -0.5, 1.0)
+    assert SteadyBeat.of(values, output, abs(turn - 0.5) < 0.1, start, interval * RATE) is None

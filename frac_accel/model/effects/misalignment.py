@@ -68,7 +68,7 @@ class Misalignment(Effect):
             roll, yaw = 0.0, np.arctan2(-turn[0, 1], turn[1, 1])
         else:
             roll, yaw = np.arctan2(turn[2, 1], turn[2, 2]), np.arctan2(turn[1, 0], turn[0, 0])
-        return cls(*(float(angle) for angle in np.degrees([roll, pitch, yaw])))
+        return cls(*(float(angle) + 0.0 for angle in np.degrees([roll, pitch, yaw])))  # no -0
 
     def std_of_turn(self, angle_std_deg):
         upright = max(abs(np.cos(np.radians(self.pitch_deg))), _SAME_AXIS)

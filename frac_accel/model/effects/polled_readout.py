@@ -10,17 +10,20 @@ from .base import STAMPS, Effect, Reading
 from .residual_power import slope_of
 from .steady_beat import Start, SteadyBeat
 
+# Scatter of the stamps, in sampling intervals, from which an age is none.
+_SCATTERED = 0.01
 # Longest segment [samples] in which the beat's frequency must hold, and how many there must be.
-_SEGMENT, _SEGMENTS = 1024, 8
+_SEGMENT, _SEGMENTS = 1024, 4
 # Lines of such a segment that are near another one, and next to none and to the Nyquist frequency,
 # where a lag is a slow one.
 _NEAR_LINES, _SLOW_LINES = 20, 8
 # Power of the beat's line over the median of all. What is in the motion makes lines of its own:
 # shares that the slope or its square may have there of all its power, or else of that near it.
-_STANDS_OUT, _IN_MOTION, _LINE_OF_MOTION = 20.0, 0.05, 0.4
-# Standard deviations of the second harmonic from none; its size over the first one's (a half in a
-# sawtooth, less behind a filter), and the share of it that has a sawtooth's phase.
-_SIGNIFICANT, _HARMONIC, _IN_PHASE = 6.0, (0.15, 0.75), 0.8
+_STANDS_OUT, _IN_MOTION, _LINE_OF_MOTION = 4.5, 0.05, 0.4
+# Standard deviations of a sawtooth's harmonics from none, their size over that of the sawtooth with
+# the same first one, which is less behind a filter, and the power that the second one may have out
+# of its phase, over that in it.
+_SIGNIFICANT, _HARMONIC, _OUT_OF_PHASE = 4.5, (0.3, 1.5), 0.5
 # Share of the error's power that it must make, and how many times what a gain with the same beat
 # would; the largest difference of the interval in two halves of equal power.
 _SHARE, _BETTER, _ALIKE = 0.05, 3.0, 0.25
@@ -28,9 +31,10 @@ _SHARE, _BETTER, _ALIKE = 0.05, 3.0, 0.25
 _HALVINGS = 5
 # Phases that the beat is divided into, and the share of them around the jump that is left out.
 _PHASES, _AROUND_JUMP = 32, 0.25
-# Deviations, and share, of the interval within which a rate of the sensor's clock goes with the
-# beat, and the highest one that is looked at.
-_WITHIN, _BY_FILTERS, _FASTEST = 3.0, 0.03, 1000
+# Deviations of the interval within which a rate of the sensor's clock goes with the beat, share by
+# which filters may take from the interval, squares of deviations by which another rate must be
+# farther off, and the highest rate that is looked at.
+_WITHIN, _BY_FILTERS, _LIKELIER, _FASTEST = 3.0, 0.1, 6.0, 1000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,7 +67,7 @@ class PolledReadout(Effect):
         """The residual follows the slope by a lag that is a sawtooth of time."""
         own = seen.on_own_clock()
         # values between samples have no age; rounding of steady motion beats, too
-        if seen.found.jitter_rms_s or seen.is_coarse or own is None:
+        if own is None or seen.is_coarse or seen.found.jitter_rms_s * own[3] > _SCATTERED:
             return None
         measured, output, used, rate, place = own
         beat = Beat.of(measured, output, used)
@@ -127,20 +131,18 @@ class Beat(NamedTuple):
         if line is None:
             return None
         frequency = line / size
-        phase = _tracked(shared, frequency, size)
-        first, second = _harmonics(shared, phase)
-        std = np.sqrt(np.sum(shared**2))
-        ratio = abs(second) / max(abs(first), 1e-300)
-        if abs(second) < _SIGNIFICANT * std or not _HARMONIC[0] < ratio < _HARMONIC[1] \
-                or second.imag**2 < _IN_PHASE * abs(second)**2:
+        stands_out, rising, phase = max(
+            ((*_stands_out(error, slope, phase), phase) for phase in
+             _phases(shared, frequency, size)), key=lambda entry: entry[0])
+        if stands_out < _SIGNIFICANT:
             return None
         middle = int(np.searchsorted(np.cumsum(power), power.sum() / 2))
-        # rising where the second harmonic is a sine of the same sign as the first one's cosine
-        rising = second.imag < 0
-        heights = [_height(shared[half], power[half], phase[half], rising)[0]
-                   for half in (slice(middle), slice(middle, None))]
+        halves = [_height(shared[half], power[half], phase[half], rising)
+                  for half in (slice(middle), slice(middle, None))]
         height, height_std = _height(shared, power, phase, rising)
-        if height <= 0 or abs(heights[1] - heights[0]) > _ALIKE * height:
+        (one, one_std), (two, two_std) = halves
+        if height <= 0 or abs(two - one) > max(_ALIKE * height,
+                                               _WITHIN * np.hypot(one_std, two_std)):
             return None
         added = _folded(shared, power, phase) * slope
         explained = _explained(error, added)
@@ -150,21 +152,26 @@ class Beat(NamedTuple):
         turned = np.unwrap(phase)[::size] / (2 * np.pi)
         beat = float((turned[-1] - turned[0]) / (size * (len(turned) - 1)))
         wanders = float(np.std(np.diff(turned) / size) / np.sqrt(len(turned) - 1))
-        start = Start.of(shared, beat, wanders, rising, abs(first))
+        first = abs(np.sum(shared * np.exp(-1j * phase)))
+        start = Start.of(shared, beat, wanders, rising, first)
         words = f"its phase wanders: at one frequency {min(start.adds_up, 1):.0%} of it adds up"
-        steady = None
-        if start.is_steady:
-            steady = SteadyBeat.of(measured, output, used, start, height if rising else -height)
-            taken = float(np.sum(error**2) - np.sum(_without_slow(
-                (measured - output - steady.added) * used, slope, level, size)**2))
-            if taken > explained and abs(abs(steady.height) - height) < _ALIKE * height:
-                beat, wanders, words = steady.frequency, steady.frequency_std, steady.words
-                added, explained = steady.added, taken
-                # a phase that wanders a little makes it smaller
-                height_std = float(np.hypot(steady.height_std, height - abs(steady.height)))
-                height = abs(steady.height)
-            else:
-                steady = None
+        # as well as the first harmonic's phase is known (D. C. Rife, R. R. Boorstyn, IEEE Trans.
+        # Inf. Theory 20 (1974) 591-598)
+        by_chance = float(np.sqrt(6 * np.sum(shared**2)) / (2 * np.pi * len(shared) * first))
+        if wanders < by_chance:
+            wanders, words = by_chance, "it has one frequency all along the record"
+        steady = start.is_steady and SteadyBeat.of(measured, output, used, start,
+                                                   height if rising else -height) or None
+        taken = float(np.sum(error**2) - np.sum(_without_slow(
+            (measured - output - steady.added) * used, slope, level, size)**2)) if steady else 0.0
+        if steady and taken > explained and abs(abs(steady.height) - height) < _ALIKE * height:
+            beat, wanders, words = steady.frequency, steady.frequency_std, steady.words
+            added, explained = steady.added, taken
+            # a phase that wanders a little makes it smaller
+            height_std = float(np.hypot(steady.height_std, height - abs(steady.height)))
+            height = abs(steady.height)
+        else:
+            steady = None
         rates = _own_rates(beat, height, height_std, rising)
         if not len(rates):
             return None
@@ -213,19 +220,47 @@ def _segments(values, size):
     return np.hanning(size) * values[rows]
 
 
-def _tracked(shared, frequency, size):
-    """Phase [rad] of the beat, which wanders, shape (n,): that of a cosine."""
+def _phases(shared, frequency, size):
+    """Phases [rad] that the beat may have, each of shape (n,), of a cosine: those of one frequency,
+    and some that wander."""
     from scipy.signal import fftconvolve
-    even = 2 * np.pi * frequency * np.arange(len(shared))
+    count = np.arange(len(shared))
+    start = Start.of(shared, frequency, 1 / (4 * size), True, 1.0)
+    yield 2 * np.pi * (start.frequency * count + start.turn - 0.25)
+    even = 2 * np.pi * frequency * count
     turned = shared * np.exp(-1j * even)
-    phases = (even + np.angle(fftconvolve(turned, np.hanning(size >> halved), "same"))
-              for halved in range(_HALVINGS))
-    # the second harmonic, which nothing follows, shows how well the first is followed
-    return max(phases, key=lambda phase: abs(_harmonics(shared, phase)[1]))
+    for halved in range(_HALVINGS):
+        yield even + np.angle(fftconvolve(turned, np.hanning(size >> halved), "same"))
 
 
-def _harmonics(shared, phase):
-    return [np.sum(shared * np.exp(-1j * k * phase)) for k in (1, 2)]
+def _stands_out(error, slope, phase):
+    """Standard deviations by which a lag's further harmonics are those of a sawtooth, below zero
+    where they are others; and whether it rises.
+
+    They are fitted beside the first one and the second out of phase; the errors are what all of
+    these leave.
+    """
+    found = []
+    for rising in (True, False):
+        turn = _turn(phase, rising)
+        higher = turn - np.sin(2 * np.pi * turn) / np.pi
+        columns = slope[:, None] * np.stack(
+            [np.sin(phase), np.cos(phase), np.cos(4 * np.pi * turn), higher], axis=1)
+        inverse = np.linalg.pinv(columns.T @ columns, hermitian=True)
+        sizes = inverse @ (columns.T @ error)
+        scores = columns * (error - columns @ sizes)[:, None]
+        std = np.sqrt(np.diag(inverse @ (scores.T @ scores) @ inverse))[3]
+        first, own = np.pi * np.hypot(*sizes[:2]), sizes[3] if rising else -sizes[3]
+        is_like = _HARMONIC[0] < own / max(first, 1e-300) < _HARMONIC[1] \
+            and (2 * np.pi * sizes[2])**2 < _OUT_OF_PHASE * own**2
+        found.append((own / max(std, 1e-300) if is_like else -1.0, rising))
+    return max(found)
+
+
+def _turn(phase, rising):
+    """Turns from the middle of a sawtooth's slope, whose first harmonic is a cosine of a phase."""
+    # a rising one is zero a quarter before its crest
+    return (phase / (2 * np.pi) + (0.25 if rising else -0.25) + 0.5) % 1 - 0.5
 
 
 def _places(phase):
@@ -241,8 +276,7 @@ def _folded(shared, power, phase):
 
 def _height(shared, power, phase, rising):
     """Height of the sawtooth, and its standard uncertainty, by its slope away from its jump."""
-    # a rising sawtooth whose first harmonic is a cosine is zero a quarter before its crest
-    turn = (phase / (2 * np.pi) + (0.25 if rising else -0.25) + 0.5) % 1 - 0.5
+    turn = _turn(phase, rising)
     kept = abs(turn) < 0.5 - _AROUND_JUMP / 2
     weight = np.where(kept, power, 0.0)
     total = max(weight.sum(), 1e-300)
@@ -259,6 +293,13 @@ def _explained(error, added):
 
 def _own_rates(beat, interval, std, rising):
     """Rates of the sensor's clock, in samples of the record, that go with a beat: whole ones and
-    the beat."""
+    the beat. Where one of them is far more likely, that."""
     rates = np.arange(1, _FASTEST) + (-beat if rising else beat)
-    return rates[abs(1 / rates - interval) < _WITHIN * std + _BY_FILTERS * interval]
+    # what is behind a filter, or jumps gradually, is less high
+    longer = np.maximum(1 / rates - interval - _BY_FILTERS / rates, 0.0)
+    off = np.where(1 / rates > interval, longer, interval - 1 / rates) / std
+    rates, off = rates[off < _WITHIN], off[off < _WITHIN]
+    first = np.argsort(off)[:2]
+    if len(first) == 2 and np.diff(off[first]**2)[0] > _LIKELIER:
+        return rates[first[:1]]
+    return rates

@@ -69,6 +69,11 @@ class SteadyBeat(NamedTuple):
         start : Start
         height : float
             Below zero where the sawtooth falls.
+
+        Returns
+        -------
+        SteadyBeat or None
+            None where no sample that counts is near a jump.
         """
         read, steepness = _between(output)
         count = np.arange(len(output))
@@ -96,6 +101,8 @@ class SteadyBeat(NamedTuple):
         scores, stretch = _by_stretches(columns, error)
         stds = np.sqrt(np.diag(inverse @ (scores.T @ scores) @ inverse))
         near = used & (abs(turn) > 0.5 - _NEAR)
+        if not near.any():
+            return None
         other = (measured - taken - read(
             count + place[0] + place[1] * (turn - np.sign(turn))))[near]
         power = np.sum((columns[:, 3] * error)**2) / max(np.sum(columns[:, 3]**2), 1e-300)
