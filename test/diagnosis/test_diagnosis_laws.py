@@ -110,6 +110,7 @@ def test_one_chebyshev_filter_is_not_three_causes(seed):
     assert not named(found) & {"mounting_resonance", "low_pass_lag"}
 
 
+@pytest.mark.long  # a minute of processor time each
 @pytest.mark.parametrize("seed", [3541, 3542])
 def test_noise_of_a_reference_that_rings_through_the_model_is_no_cause(seed):
     rng = np.random.default_rng(seed)

@@ -75,7 +75,7 @@ def test_a_turn_beside_a_filter_of_all_axes(link, seed):
     assert left.std() == pytest.approx(found.extended["rmse"], rel=0.1)
 
 
-@pytest.mark.thorough
+@pytest.mark.long  # a minute of processor time each
 @pytest.mark.parametrize("seed", range(2))
 def test_a_filter_of_one_axis_is_not_given_to_the_others(seed):
     rng = np.random.default_rng([72, seed])

@@ -67,7 +67,9 @@ def test_a_clock_that_is_off_does_not_bend_what_is_identified(seed, skew_ppm):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("kind", ["none", "skew", "one", "to and fro", "given twice"])
+@pytest.mark.parametrize("kind", ["none", "skew", "one",
+                                  pytest.param("to and fro", marks=pytest.mark.long),
+                                  pytest.param("given twice", marks=pytest.mark.long)])
 def test_other_clocks_lose_no_samples(kind):
     (reference, sensor), _, _ = made(5, 0)
     after_s = 1e-9 * (sensor.stamps_ns - sensor.stamps_ns[0])

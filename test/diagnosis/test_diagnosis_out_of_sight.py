@@ -112,7 +112,7 @@ def test_what_an_identified_sensor_shows_too_early_is_the_references_doing(seed,
     assert found.model.reference_faults == (finding.effect,)
 
 
-@pytest.mark.thorough
+@pytest.mark.long  # a minute of processor time each
 @pytest.mark.parametrize("seed", [9, 10])
 def test_two_filters_above_the_motion_have_no_name(seed):
     # a viscoelastic mount was told as these two: below them many filters do the same

@@ -35,6 +35,7 @@ def test_an_exact_sensor_is_consistent(seed):
     assert (found.verdict, named(found)) == ("consistent", set())
 
 
+@pytest.mark.long  # a minute of processor time each
 @pytest.mark.parametrize("seed", [3111, 3112])
 def test_a_filter_that_no_cause_says_gets_no_second_name(seed):
     rng, motion, _ = drive(seed)

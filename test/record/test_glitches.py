@@ -76,7 +76,7 @@ def test_shocks_that_both_see_are_motion(seed):
 
 
 @pytest.mark.parametrize("kind", [
-    "hold", pytest.param("zeros", marks=pytest.mark.thorough),
+    "hold", pytest.param("zeros", marks=pytest.mark.long),
     pytest.param("noise", marks=pytest.mark.thorough)])
 def test_a_faulty_reference_gives_the_sensor_no_name(kind):
     """Bursts of interference were named, or noise of the reference."""
