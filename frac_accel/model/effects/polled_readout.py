@@ -25,7 +25,7 @@ _STANDS_OUT, _IN_MOTION, _LINE_OF_MOTION = 4.5, 0.05, 0.4
 # of its phase, over that in it.
 _SIGNIFICANT, _HARMONIC, _OUT_OF_PHASE = 4.5, (0.3, 1.5), 0.5
 # Share of the error's power that it must make, and how many times what a gain with the same beat
-# would; the largest difference of the interval in two halves of equal power.
+# would; the share by which the interval may differ in two halves of equal power.
 _SHARE, _BETTER, _ALIKE = 0.05, 3.0, 0.25
 # Times that the time is halved within which the beat is followed.
 _HALVINGS = 5
@@ -136,13 +136,8 @@ class Beat(NamedTuple):
              _phases(shared, frequency, size)), key=lambda entry: entry[0])
         if stands_out < _SIGNIFICANT:
             return None
-        middle = int(np.searchsorted(np.cumsum(power), power.sum() / 2))
-        halves = [_height(shared[half], power[half], phase[half], rising)
-                  for half in (slice(middle), slice(middle, None))]
-        height, height_std = _height(shared, power, phase, rising)
-        (one, one_std), (two, two_std) = halves
-        if height <= 0 or abs(two - one) > max(_ALIKE * height,
-                                               _WITHIN * np.hypot(one_std, two_std)):
+        height, height_std = _height_of_both_halves(shared, power, phase, rising)
+        if height <= 0:
             return None
         added = _folded(shared, power, phase) * slope
         explained = _explained(error, added)
@@ -272,6 +267,16 @@ def _folded(shared, power, phase):
     place = _places(phase)
     sums = [np.bincount(place, values, _PHASES) for values in (shared, power)]
     return (sums[0] / np.maximum(sums[1], 1e-300))[place]
+
+
+def _height_of_both_halves(shared, power, phase, rising):
+    """As `_height`; 0 where two halves of equal power have another one."""
+    middle = int(np.searchsorted(np.cumsum(power), power.sum() / 2))
+    (one, one_std), (two, two_std) = (_height(shared[half], power[half], phase[half], rising)
+                                      for half in (slice(middle), slice(middle, None)))
+    height, std = _height(shared, power, phase, rising)
+    alike = max(_ALIKE * height, _WITHIN * np.hypot(one_std, two_std))
+    return height if abs(two - one) < alike else 0.0, std
 
 
 def _height(shared, power, phase, rising):
