@@ -27,6 +27,9 @@ _SIGNIFICANT, _HARMONIC, _OUT_OF_PHASE = 4.5, (0.3, 1.5), 0.5
 # Share of the error's power that it must make, and how many times what a gain with the same beat
 # would; the share by which the interval may differ in two halves of equal power.
 _SHARE, _BETTER, _ALIKE = 0.05, 3.0, 0.25
+# Share of a beat whose phase wanders that adds up at one frequency, below which it must make a
+# larger share of the error: two clocks hardly wander, and a phase that is followed follows chance.
+_ADDS_UP, _WANDERING = 0.9, 0.15
 # Times that the time is halved within which the beat is followed.
 _HALVINGS = 5
 # Phases that the beat is divided into, and the share of them around the jump that is left out.
@@ -165,6 +168,8 @@ class Beat(NamedTuple):
             # a phase that wanders a little makes it smaller
             height_std = float(np.hypot(steady.height_std, height - abs(steady.height)))
             height = abs(steady.height)
+        elif start.adds_up < _ADDS_UP and explained < _WANDERING * total:
+            return None
         else:
             steady = None
         rates = _own_rates(beat, height, height_std, rising)
