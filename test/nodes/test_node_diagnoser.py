@@ -64,11 +64,15 @@ def test_a_change_is_told_and_its_model_applied_and_taken_back(tmp_path):
         [effect] = (effect for effect in SensorModel.load(extended).axis("x").effects
                     if effect.cause != "dropped_samples")
         assert effect.cause == "sensitivity_error" and effect.gain == pytest.approx(1.1, abs=0.01)
-        statuses = [status for status in probe.statuses if status.name == "diagnoser: model"]
-        values = {pair.key: pair.value for pair in statuses[-1].values}
-        assert values["model_file"] == extended and values["state"] == "learning"
-        assert any("sensitivity_error" in pair.value for status in statuses
-                   for pair in status.values if pair.key == "causes")
+
+        def said():
+            """What it has said of its model, each time."""
+            return [{pair.key: pair.value for pair in status.values}
+                    for status in list(probe.statuses) if status.name == "diagnoser: model"]
+        # it says so a second later
+        probe.until(lambda: said()[-1]["model_file"] == extended
+                    and said()[-1]["state"] == "learning", said)
+        assert any("sensitivity_error" in values.get("causes", "") for values in said())
         assert probe.trigger("/diagnoser/roll_back").success
         node.wait_for('"step": "rolled back"', 30)
         deadline = time.monotonic() + 20
