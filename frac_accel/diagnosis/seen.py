@@ -143,14 +143,14 @@ class Seen:
         """Values before they were resampled or filtered, the simulated output at their instants,
         and which of them lie where the fit counted samples."""
         if self.record.band_hz is not None and self.record.topics:
-            return self._before_resampling()[1:]
+            return self._before_resampling()[2:]
         return self.measured[self.rows], self.output[self.rows], self.used[self.rows]
 
     def on_own_clock(self):
         """Values as they were recorded, the simulated output at their instants, which of them the
         fit counted, all of shape (m,), their rate [Hz], and their places among the record's
-        instants; None where they have no uniform instants of their own. None counts that is
-        missing."""
+        instants; None where they have no uniform instants of their own. What is missing does not
+        count."""
         record = self.record
         if any(topic.is_moved for topic in record.topics or ()) or self.is_uneven:
             return None
@@ -158,12 +158,11 @@ class Seen:
             return (self.measured, self.output, self.used, record.sampling_rate_hz,
                     np.arange(len(self.output)))
         topic = record.topics[1]
-        good, values, output, used = self._before_resampling()
+        good, place, values, output, used = self._before_resampling()
         slot = topic.clock.slot[good].astype(int)
         every = np.arange(slot[0], slot[-1] + 1)
         there = np.zeros(len(every), bool)
         there[slot - slot[0]] = used
-        place = self._place(topic.clock.instants_s(topic.stamps_ns))[good]
         return (*(np.interp(every, slot, one) for one in (values, output)), there,
                 topic.clock.rate_hz, np.interp(every, slot, place))
 
@@ -177,18 +176,18 @@ class Seen:
         return inside(np.interp(np.arange(count), place, values))
 
     def _before_resampling(self):
-        """`as_recorded`, and which of the topic's samples they are."""
+        """Which of the topic's samples are `as_recorded`, their places, and those."""
         topic = self.record.topics[1]
         place = self._place(topic.clock.instants_s(topic.stamps_ns))
         slot = np.round(place).astype(int)
         good = (slot >= 0) & (slot < len(self.output))
         good[good] = self.rows[slot[good]]
-        return (good, topic.values[good, self.axis], self._output_at(place[good]),
+        return (good, place[good], topic.values[good, self.axis], self._output_at(place[good]),
                 self.used[slot[good]])
 
     def _beside(self, place):
         """Values before they were resampled, the output at their instants and at other places."""
-        good, values, output, used = self._before_resampling()
+        good, _, values, output, used = self._before_resampling()
         return values[used], output[used], self._output_at(place[good][used])
 
     def _place(self, seconds):

@@ -8,7 +8,7 @@ import numpy as np
 from ..parameters import parameter
 from .base import STAMPS, Effect, Reading
 from .residual_power import slope_of
-from .steady_beat import Start, SteadyBeat
+from .steady_beat import STEADY, Start, SteadyBeat
 
 # Scatter of the stamps, in sampling intervals, from which an age is none.
 _SCATTERED = 0.01
@@ -157,7 +157,7 @@ class Beat(NamedTuple):
         # Inf. Theory 20 (1974) 591-598)
         by_chance = float(np.sqrt(6 * np.sum(shared**2)) / (2 * np.pi * len(shared) * first))
         if wanders < by_chance:
-            wanders, words = by_chance, "it has one frequency all along the record"
+            wanders, words = by_chance, STEADY
         steady = start.is_steady and SteadyBeat.of(measured, output, used, start,
                                                    height if rising else -height) or None
         taken = float(np.sum(error**2) - np.sum(_without_slow(
@@ -241,11 +241,12 @@ def _stands_out(error, slope, phase):
     these leave.
     """
     found = []
+    # out of phase with the second harmonic of a sawtooth, whether that rises or falls
+    lower = np.stack([np.sin(phase), np.cos(phase), np.cos(2 * phase)], axis=1)
     for rising in (True, False):
         turn = _turn(phase, rising)
         higher = turn - np.sin(2 * np.pi * turn) / np.pi
-        columns = slope[:, None] * np.stack(
-            [np.sin(phase), np.cos(phase), np.cos(4 * np.pi * turn), higher], axis=1)
+        columns = slope[:, None] * np.column_stack([lower, higher])
         inverse = np.linalg.pinv(columns.T @ columns, hermitian=True)
         sizes = inverse @ (columns.T @ error)
         scores = columns * (error - columns @ sizes)[:, None]

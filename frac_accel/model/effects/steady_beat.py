@@ -23,6 +23,8 @@ _STRETCHES, _SCATTERS, _WANDERS = 32, 2.0, 1.6
 # Times the rate at which the output is known before it is read between samples.
 _FINE = 4
 
+STEADY = "it has one frequency all along the record"
+
 
 class SteadyBeat(NamedTuple):
     """A sawtooth of one frequency, in sampling intervals.
@@ -49,7 +51,7 @@ class SteadyBeat(NamedTuple):
     @property
     def words(self):
         """How its phase runs."""
-        return "it has one frequency all along the record" + (
+        return STEADY + (
             f", beside a phase that wanders by {self.wander:.2g} of a turn" if self.wander else "")
 
     @classmethod
