@@ -21,6 +21,8 @@ _LASTS = 0.1
 _FINE = 4
 # Steps of the lattice from which on a signal moves between two samples that are not neighbours.
 _MOVES_ON = 3.0
+# Standard deviations of the stamps' scatter beyond which a stamp is none of it.
+_SCATTER = 6.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,10 +125,16 @@ class Seen:
             return self._beside(stamped)
         slot = (topic.clock.slot + np.round(np.median(
             stamped + self.record.lag_s * self.record.sampling_rate_hz - topic.clock.slot)))
-        good = (slot >= 0) & (slot < len(self.output))
+        # about the instants of their own clock: what runs away from the reference's is no scatter,
+        # nor are few stamps that are far off
+        off = self.record.sampling_rate_hz * (topic.clock.even_s(topic.stamps_ns)
+                                              - topic.clock.instants_s(topic.stamps_ns))
+        off = off - np.median(off)
+        good = (slot >= 0) & (slot < len(self.output)) & (
+            np.abs(off) <= _SCATTER * topic.clock.scatter_s * self.record.sampling_rate_hz)
         good[good] = self.used[slot[good].astype(int)]
         slot = slot[good].astype(int)
-        return self.measured[slot], self.output[slot], self._output_at(stamped[good])
+        return self.measured[slot], self.output[slot], self._output_at(slot + off[good])
 
     def as_counted(self):
         """The same, but at the instants that they would have if no sample were missing."""

@@ -129,7 +129,7 @@ def verdict_on(engine, likely, found, shown_by):
     back = {}
     while True:
         named = _named(engine, likely, shown_by, back)
-        described = _described(engine, named, (likely.widest, likely.best))
+        described = _described(engine, named, likely)
         more = _taken_back(engine, likely, named, described)
         if not more:
             return _told(engine, likely, named, described, found)
@@ -184,8 +184,8 @@ def _without_mean_delay(findings):
     return [f for f in findings if not belongs(f)]
 
 
-def _described(engine, named, sets):
-    """`Described`, by what is only suspected in one of some sets of causes (`Fitted`)."""
+def _described(engine, named, likely):
+    """`Described`, by what is only suspected in the sets that are likely."""
     fitted, account, strange = named.fitted, named.account, named.strange
     # beside a model that leaves nothing that stands out, what is only suspected is chance, and a
     # hint of structure in what is left is no reason to call the record unexplained
@@ -198,6 +198,10 @@ def _described(engine, named, sets):
         named.findings, [] if plain else named.suspects, named.complete,
         0.0 if plain else named.left.share, named.fraction, account.accounted,
         (strange and not plain) or account.faulty)
+    if verdict == "consistent" and named.unnamed:
+        bare = _account(engine, engine.search.baseline, [], likely.noise)
+        if not bare.accounted and account.after <= _CLEARLY * bare.after:
+            verdict = "unexplained"  # not by the model in use, but by what has no name
     if verdict == "consistent" and hides_much(engine.record.beyond(engine.problem.axis)):
         verdict = "undecided"
     if verdict in _INCOMPLETE and named.may_be_noise:
@@ -208,7 +212,7 @@ def _described(engine, named, sets):
     named_causes = {f.cause for f in named.findings}
     described = _by_curves(engine, fitted, account.after, named_causes)
     wider, known = None, {}
-    for each in {each.causes: each for each in sets}.values():
+    for each in {each.causes: each for each in (likely.widest, likely.best)}.values():
         found = _kept(engine, named, each, account.after)
         if found is None:
             continue
@@ -271,7 +275,7 @@ def _told(engine, likely, named, described, found):
     if p.others.in_own_core:
         model, findings = in_own_core(model, findings, p.others.in_own_core, AXES[p.axis])
     reason = reason_of(verdict, account.share, noise, account.accounted, named.strange,
-                       named.may_be_noise, engine.record.beyond(p.axis)) \
+                       named.may_be_noise, engine.record.beyond(p.axis), bool(named.unnamed)) \
         + set_aside(engine.aside, engine.drowned, engine.record.valid) \
         + description_words(described.words, named.unnamed, described.kept,
                             after / account.spread) \

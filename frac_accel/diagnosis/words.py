@@ -46,7 +46,11 @@ def verdict_of(findings, suspects, complete, share, fraction, accounted, strange
     return "unexplained"
 
 
-def reason_of(verdict, nrmse, noise, accounted, strange, grows, beyond=None):
+def reason_of(verdict, nrmse, noise, accounted, strange, grows, beyond=None, unsure=False):
+    """Words for a verdict; `unsure`: what explains the record has no name."""
+    if verdict == "unexplained" and accounted and unsure and not strange:
+        return ("the model in use is wrong, and nothing that would explain it is sure enough for a "
+                f"name; {_percent(nrmse)} of the output is left with it" + beyond_words(beyond))
     if verdict == "undecided" and grows:
         return (f"{nrmse:.1%} of the output is unaccounted for; it comes and goes with the motion, "
                 "and nothing predicts it: noise that grows with the motion, or an unknown cause; "

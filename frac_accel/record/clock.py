@@ -101,7 +101,8 @@ class Clock:
     slot : ndarray, shape (n,)
         Whole instants, ascending; empty where there are none.
     scatter_s : float
-        Standard deviation of the stamps about the line [s]; 0 of uneven ones.
+        Standard deviation of the stamps about the line [s], and about two where they jump once;
+        0 of uneven ones.
     jump : Jump or None
         Where they jump once against the instants.
     """
@@ -142,13 +143,16 @@ class Clock:
                        np.empty(0), 0.0)
         slope, start = _line(slot, seconds)
         late = seconds - (slope * slot + start)
-        jump = _set_once(slot, seconds, late, slope)
-        if jump is None:
-            return cls("regular", rate, float(np.median(place)) / rate, slot, float(np.std(late)))
-        before = jump.undone(seconds)
-        slope, start = _line(slot, before)
-        scatter = float(np.std(before - (slope * slot + start)))
-        return cls("regular", float(1 / slope), float(start), slot, scatter, jump)
+        scatter, jump = float(np.std(late)), _set_once(slot, seconds, late, slope)
+        if jump is not None:
+            before = jump.undone(seconds)
+            slope, start = _line(slot, before)
+            scatter = float(np.std(before - (slope * slot + start)))
+            at = np.searchsorted(seconds, jump.at_s)
+            if slot[at] - slot[at - 1] == 1:
+                return cls("regular", float(1 / slope), float(start), slot, scatter, jump)
+            # samples may be lost there, or none: the stamps do not tell, but they do not scatter
+        return cls("regular", rate, float(np.median(place)) / rate, slot, scatter)
 
     def instants_s(self, stamps_ns):
         """Instants [s] of the samples with these stamps, after the first of them."""
@@ -382,7 +386,7 @@ def _set_once(slot, seconds, late, interval):
     inner = slice(_ON_EACH_SIDE, count - _ON_EACH_SIDE)
     taken = np.where(power > 0, sums**2 / np.maximum(power, 1e-300), 0.0)[inner]
     at = _ON_EACH_SIDE + int(np.argmax(taken))
-    if taken.max() < _ONE_JUMP * (late @ late) or slot[at] - slot[at - 1] != 1:
+    if taken.max() < _ONE_JUMP * (late @ late):
         return None
     return Jump(float(seconds[at]), float(sums[at] / power[at]))
 

@@ -14,6 +14,11 @@ from .residual_power import follows, likelihood, slope_of, variance_law
 _SIGNIFICANT = 8.0
 _BETTER = 12.0
 _SHARE = 0.05
+# Periods of the motion over which its power is averaged: what follows that as well as the slope at
+# each instant is noise that grows with the motion.
+_PERIODS = (1, 4, 16)
+# Share of the scatter by which it may be open.
+_OPEN = 0.5
 # Share of samples that repeat the one before while the signal moves on, from which they are what
 # scatters.
 _REPEATED = 0.01
@@ -43,7 +48,8 @@ class SamplingJitter(Effect):
     @classmethod
     def recognised(cls, seen, shown):
         """The residual's power is noise and J**2 times the slope's, sample by sample."""
-        from scipy.signal import oaconvolve  # here, as the corrector needs nothing of it
+        from scipy.ndimage import uniform_filter1d  # here, as the corrector needs nothing of them
+        from scipy.signal import oaconvolve
         around = seen.of_one_error
         if seen.found.jitter_rms_s or around is None:
             return None  # stamps that scatter do the same, and so do values between samples
@@ -59,17 +65,27 @@ class SamplingJitter(Effect):
             return oaconvolve(power, around**2, "same")[used]
         squares = {"slope": of_errors(slope**2), "level": of_errors(level**2),
                    "bend": of_errors(bend**2)}
-        fits = {name: variance_law(error, square) for name, square in squares.items()}
-        noise, factor, std = fits["slope"]
+        noise, factor, std = variance_law(error, squares["slope"])
         if seen.is_coarse:
             # what rounding makes of a small signal follows its slope as well
             factor -= max(variance_law(seen.rounding()[used], squares["slope"])[1], 0.0)
         share = factor * squares["slope"].mean() / np.mean(error**2)
-        own = likelihood(error, noise + factor * squares["slope"])
-        if factor < _SIGNIFICANT * std or share < _SHARE or any(
-                own - likelihood(error, fits[name][0] + fits[name][1] * squares[name]) < _BETTER
-                for name in ("level", "bend")):
+        if factor < _SIGNIFICANT * std or share < _SHARE:
             return None
+        own = likelihood(error, noise + factor * squares["slope"])
+        period = 2 * np.pi * np.sqrt(np.mean(slope[used]**2) / max(np.mean(bend[used]**2), 1e-300))
+
+        def others():
+            yield squares["level"]
+            yield squares["bend"]
+            for periods in _PERIODS:
+                length = min(max(int(periods * period), 1), len(level))
+                for values in (slope, level, bend):
+                    yield of_errors(uniform_filter1d(values**2, length))
+        for square in others():
+            constant, grows, _ = variance_law(error, square)
+            if own - likelihood(error, constant + grows * square) < _BETTER:
+                return None
         # of the next order: a normal shift to the power of four is three times its variance's
         # square on average
         both = squares["slope"] + factor * of_errors(0.75 * bend**2 + slope * slope_of(bend))
@@ -88,9 +104,12 @@ class SamplingJitter(Effect):
         rms = float(np.sqrt(less * factor))
         # the sum of all errors says it, too: by as much as it says otherwise the law may be wrong
         other = np.sqrt(less * max(np.mean(error**2) - noise, 0.0) / both.mean())
+        uncertain = np.sqrt((less * std / (2 * rms))**2 + ((1 - less) * rms / 4)**2
+                            + (rms - other)**2)
+        if uncertain > _OPEN * rms:
+            return None
         after = error * np.sqrt(noise / power)
         return cls(rms / rate), Reading(
-            {"rms_s": float(np.sqrt((less * std / (2 * rms))**2 + ((1 - less) * rms / 4)**2
-                                    + (rms - other)**2) / rate)}, error, after,
+            {"rms_s": float(uncertain / rate)}, error, after,
             f"the error's power follows the square of the slope: {share:.0%} of it, "
             f"{factor / std:.3g} standard deviations from none")
