@@ -48,6 +48,8 @@ _ALIKE, _TELLS_LAW = 0.8, 5.0
 # adds (RMS) from which it is slow. Then it must take so many times what is left wanders by: the
 # best step in noise with a long memory takes three to four times that.
 _SLOW_PARTS, _SLOW_SHARE, _SLOW_TIMES = 20, 0.5, 6.0
+# Share of its strength by which the part of it that is not slow may be stronger or weaker.
+_AS_STRONG = 0.1
 # Scatter of what a constant adds, over it: a dead zone, or samples that do not count, make some.
 _CONSTANT = 0.1
 # Share of what a cause takes (RMS) that it must change the output by: else its free motion does
@@ -136,7 +138,8 @@ def doubts_about(engine, best, gains, stds, left, noise):
         for cause, rms in takes.items():
             like = best.effects[cause].kindred(best.residual, p.time)
             strange = math.sqrt(max(unexplained**2 - like**2, 0.0))
-            if rms < WEIGHS * strange and not engine.stands_among_slow(best, cause, rms):
+            if rms < WEIGHS * strange and not engine.stands_among_slow(best, cause, rms) \
+                    and not engine.stands_in_its_kind(best, cause, rms):
                 doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) does not stand out of "
                                          f"what is left unexplained ({strange:.3g} RMS)")
     if words := most_is_left(engine, left, noise):
@@ -206,13 +209,31 @@ def _as_slow(engine, best, added, takes):
     for cause, change in added.items():
         if cause in turned_back or slow(change) <= _SLOW_SHARE * engine.rms(change):
             continue
-        if takes[cause] < _SLOW_TIMES * wanders:
+        if takes[cause] < _SLOW_TIMES * wanders and not _is_as_strong_fast(p, best, change):
             found[cause] = f"what it explains is slow ({takes[cause]:.3g} RMS), and what is left " \
                            f"wanders by {wanders:.3g} RMS"
         elif turned_back and best.effects[cause].stage != CROSS_AXIS:
             found[cause] = f"what it explains is slow ({takes[cause]:.3g} RMS), as the " \
                            f"reference's own noise is where {turned_back[0]} is turned back"
     return found
+
+
+def _is_as_strong_fast(problem, best, change):
+    """Whether the part of what a cause adds that is not slow is there as well, as strong: of that,
+    noise with a long memory has little, and what has none of it is only slow.
+
+    The uncertainty of its strength is by parts of the record (cluster-robust).
+    """
+    length = max(problem.count // _SLOW_PARTS, 1)
+    fast, left = (values - uniform_filter1d(values, length) for values in (change, best.residual))
+    parts = np.array_split(np.flatnonzero(problem.used), _SLOW_PARTS)
+    energy = np.array([fast[rows] @ fast[rows] for rows in parts])
+    more = np.array([fast[rows] @ left[rows] for rows in parts])
+    if not energy.sum() > 0:
+        return False
+    off = more.sum() / energy.sum()
+    std = np.linalg.norm(more - off * energy) / energy.sum()
+    return bool(_SLOW_TIMES * std < 1 + off and abs(off) < _AS_STRONG)
 
 
 def by_what_is_left(engine, fitted, takes, left):

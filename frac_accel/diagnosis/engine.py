@@ -73,6 +73,8 @@ _SAME = 1.0
 _ALONE = 10.0
 # Share of the power that a slow zero adds by whose frequencies it counts, and their share of all.
 _NEARLY_ALL, _FEW_LINES = 0.99, 0.02
+# Share of what is left that may be of a cause's own kind, where the error budget finds less.
+_OF_ITS_KIND = 0.01
 # Share of the residual's power for which a coarse lattice must account.
 _COARSE = 0.2
 # RMS of the error of the model in use where it is judged, over that before, below which it errs
@@ -583,6 +585,21 @@ class Engine:
             return False
         slow = dct(fitted.residual, norm="ortho")[1:1 + count]
         return taken > _ALONE * np.linalg.norm(slow) / np.sqrt(self.problem.count)
+
+    def stands_in_its_kind(self, fitted, cause, taken):
+        """Whether what a cause takes (RMS) stands far out of all that may be left of its kind, of
+        what comes across from other axes or changes with time: nothing of another kind does that.
+        """
+        effect = fitted.effects[cause]
+        if effect.stage == CROSS_AXIS:
+            kind = "across"
+        elif effect.shows_with_time and not effect.adds:
+            kind = "time_varying"
+        else:
+            return False
+        most = max([_OF_ITS_KIND, *(entry["ci95"][1] for entry in self._audible_parts(fitted)
+                                    if entry["part"] == kind)])
+        return taken > _ALONE * np.sqrt(most) * self.rms(fitted.residual)
 
     def rms(self, values):
         """RMS of values where samples count."""

@@ -53,7 +53,8 @@ def sure(engine, best, findings, tied, left, fraction):
         # something is left, which the causes may have been bent by, or mistaken for
         doubtful = {f.cause for f in findings if f.cause in best.effects
                     and not engine.stands_among_slow(best, f.cause, f.gain.taken)
-                    and (fraction > _LEFT or engine.unsteadiness(best, f.cause) > _STEADY)}
+                    and (engine.unsteadiness(best, f.cause) > _STEADY or fraction > _LEFT
+                         and not engine.stands_in_its_kind(best, f.cause, f.gain.taken))}
     fitted, stds, dropped = refitted(engine, best, {f.cause for f in findings} - doubtful, tied)
     findings = [f for f in findings if f.cause not in doubtful and f.cause not in dropped]
     fitted, stds = _with_identified(engine, best, fitted, stds)

@@ -22,7 +22,7 @@ _FINE = 4
 # Steps of the lattice from which on a signal moves between two samples that are not neighbours.
 _MOVES_ON = 3.0
 # Standard deviations of the stamps' scatter beyond which a stamp is none of it.
-_SCATTER = 6.0
+_OF_SCATTER = 6.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,7 +131,7 @@ class Seen:
                                               - topic.clock.instants_s(topic.stamps_ns))
         off = off - np.median(off)
         good = (slot >= 0) & (slot < len(self.output)) & (
-            np.abs(off) <= _SCATTER * topic.clock.scatter_s * self.record.sampling_rate_hz)
+            np.abs(off) <= _OF_SCATTER * topic.clock.scatter_s * self.record.sampling_rate_hz)
         good[good] = self.used[slot[good].astype(int)]
         slot = slot[good].astype(int)
         return self.measured[slot], self.output[slot], self._output_at(slot + off[good])

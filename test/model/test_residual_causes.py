@@ -51,6 +51,9 @@ def record(kind, seed, share=0.03):
         values = sine.motion(t + 3e-4 * np.sin(2 * np.pi * 1.3 * t)) + NOISE * rng.normal(size=N)
     elif kind == "loose contact":
         values *= ~bursts(rng, 0.02)
+    elif kind == "filter that begins anew":
+        for at in rng.choice(np.arange(200, N - 200, 200), 8, replace=False):
+            values[at:at + 200] += 0.5 * rng.choice([-1, 1]) * np.exp(-np.arange(200) / 20)
     elif kind == "heavy tails":
         values += NOISE * rng.standard_t(3, size=N)
     return t, sine.acceleration(t), values
@@ -119,7 +122,7 @@ def test_bursts_of_an_eighth_of_the_time_are_no_other_noise(seed):
 
 @pytest.mark.parametrize("kind", ["nothing", "spikes", "gain noise", "moving delay",
                                   "loose contact", "heavy tails", "sine in time",
-                                  "gain with a beat"])
+                                  "gain with a beat", "filter that begins anew"])
 def test_neither_where_it_is_something_else(kind):
     assert not {"sampling_jitter", "polled_readout", "interference_bursts",
                 "quantization"} & set(found(kind, 7))

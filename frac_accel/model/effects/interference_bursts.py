@@ -28,6 +28,9 @@ _DEVIATIONS = 4.0
 # that so many bursts have one sign; and up to which it has it where all have.
 _ONE_SIDED, _ONE_SIGN = 0.3, 1e-3
 _ALL_ONE_SIDED = 0.6
+# Correlation of one sample with the next in bursts, from which they are smooth: no noise, but how
+# something settles, such as a filter that began anew.
+_SETTLES = 0.9
 # Share of the error budget that bursts must have, and where one topic was put on the other's
 # instants: there it lacks what is fast of the motion.
 _SHOWN, _SHOWN_RESAMPLED = 0.01, 0.5
@@ -79,7 +82,7 @@ class InterferenceBursts(Effect):
         mostly = share * (loud - noise) > _MOSTLY * np.mean(error**2)
         if len(starts) < (_FEWEST if mostly else _SEVERAL) or _going_on(error, noise) < _GOES_ON \
                 or _follows(inside, error, output, len(starts)) \
-                or _one_sided(error, inside) \
+                or _one_sided(error, inside) or _smooth(error, inside) > _SETTLES \
                 or _grows(error, output) > _AS_GOOD * better:
             return None
         values, simulated, _ = seen.as_recorded()
@@ -204,6 +207,12 @@ def _one_sided(error, inside):
     if positive in (0, count) and mean > _ALL_ONE_SIDED:
         return True
     return mean > _ONE_SIDED and binomtest(positive, count).pvalue < _ONE_SIGN
+
+
+def _smooth(error, inside):
+    """Correlation of one sample with the next within bursts."""
+    one, other = (part[inside[1:] & inside[:-1]] for part in (error[1:], error[:-1]))
+    return one @ other / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-300)
 
 
 def _grows(error, output):

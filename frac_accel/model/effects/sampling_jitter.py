@@ -18,7 +18,7 @@ _SHARE = 0.05
 # each instant is noise that grows with the motion.
 _PERIODS = (1, 4, 16)
 # Share of the scatter by which it may be open.
-_OPEN = 0.5
+_OPEN_BY = 0.5
 # Share of samples that repeat the one before while the signal moves on, from which they are what
 # scatters.
 _REPEATED = 0.01
@@ -106,7 +106,7 @@ class SamplingJitter(Effect):
         other = np.sqrt(less * max(np.mean(error**2) - noise, 0.0) / both.mean())
         uncertain = np.sqrt((less * std / (2 * rms))**2 + ((1 - less) * rms / 4)**2
                             + (rms - other)**2)
-        if uncertain > _OPEN * rms:
+        if uncertain > _OPEN_BY * rms:
             return None
         after = error * np.sqrt(noise / power)
         return cls(rms / rate), Reading(

@@ -1,0 +1,76 @@
+"""Causes beside a strong error of another kind, as all measured pairs have one."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
+
+from frac_accel import Samples, SensorModel, diagnose
+from frac_accel.model.core import Gain
+
+RATE, COUNT = 100.0, 8000
+TIME = np.arange(COUNT) / RATE
+
+
+def moving(rng, band_hz):
+    """Three axes of a motion that comes and goes, shape (n, 3)."""
+    motion = sosfiltfilt(butter(2, band_hz, "band", fs=RATE, output="sos"),
+                         rng.normal(size=(COUNT, 3)), axis=0)
+    comes = gaussian_filter1d(rng.normal(size=COUNT), 2 * RATE)
+    motion *= np.exp(0.6 * comes / comes.std())[:, None]
+    return motion / motion.std(axis=0)
+
+
+def unknown(rng, motion, size):
+    """Noise as large as this share of the motion, in its envelope: nothing predicts it."""
+    level = np.sqrt(gaussian_filter1d(np.sum(motion**2, axis=1), 0.2 * RATE))
+    return size * (level / np.sqrt(np.mean(level**2)))[:, None] * rng.normal(size=motion.shape)
+
+
+def diagnosed(reference, sensor):
+    stamps = np.round(1e9 * TIME)
+    found = diagnose(tuple(Samples.of(stamps, values) for values in (reference, sensor)),
+                     SensorModel(Gain(1.0)))
+    return {finding.cause: finding for finding in found.findings}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_gain_drifts(seed):
+    """It took less than three times what was left, and was a suspect: but nothing of what is left
+    changes with time."""
+    rng = np.random.default_rng([141, seed])
+    motion = moving(rng, (0.3, 10.0))
+    rate = rng.choice([-1, 1]) * rng.uniform(0.35, 0.5) / TIME[-1]
+    named = diagnosed(motion, (1 + rate * TIME)[:, None] * motion + unknown(rng, motion, 0.12))
+    assert named.keys() == {"gain_drift"}
+    drift = named["gain_drift"]
+    assert abs(drift.effect.rate_per_s - rate) < 4 * drift.std["rate_per_s"] < 0.4 * abs(rate)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_sensor_is_turned(seed):
+    """What it took was slow, and only four times what wandered: but it is as strong where it is
+    fast, and nothing of the other axes is left."""
+    rng = np.random.default_rng([142, seed])
+    motion = moving(rng, (0.01, 0.6))
+    turn = Rotation.from_rotvec(np.radians(rng.uniform(8, 14))
+                                * np.array([rng.uniform(-0.3, 0.3), 0.8, 0.6]))
+    named = diagnosed(motion, turn.inv().apply(motion) + unknown(rng, motion, 0.1))
+    assert named.keys() == {"misalignment"}
+    effect, std = named["misalignment"].effect, named["misalignment"].std
+    yaw, pitch, _ = turn.as_euler("ZYX", degrees=True)
+    assert abs(effect.yaw_deg - yaw) < 4 * std["yaw_deg"] < 3
+    assert abs(effect.pitch_deg - pitch) < 4 * std["pitch_deg"] < 3
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_gain_that_wanders_is_no_drift(seed):
+    rng = np.random.default_rng([143, seed])
+    motion = moving(rng, (0.3, 10.0))
+    wanders = gaussian_filter1d(rng.normal(size=COUNT), rng.uniform(0.02, 0.06) * COUNT)
+    gain = 1 + 0.15 * (wanders - wanders.mean()) / wanders.std()
+    named = diagnosed(motion, gain[:, None] * motion + unknown(rng, motion, 0.08))
+    # what follows no law may have a course
+    assert all(cause == "gain_drift" and len(finding.effect.course) or cause == "sensitivity_error"
+               for cause, finding in named.items())
