@@ -119,6 +119,7 @@ def test_live_is_offline_to_the_last_bit_and_nothing_is_lost(record, model_file,
     assert live.frame_id == "seat"
     counters = counters_of(corrector.output[-1])
     assert counters.pop("published") == len(expected)
+    counters.pop("late", None)  # how long messages waited is the machine's business
     assert counters == {name: count for name, count in offline.counters.items() if count}
     assert {"duplicates", "stamps_back", "not_finite", "gaps", "restarts"} <= set(counters)
 
