@@ -204,7 +204,7 @@ def _as_slow(engine, best, added, takes):
     turned_back = [cause for cause, effect in best.effects.items() if np.any(effect.poles() == 0)]
 
     def slow(values):
-        return engine.rms(uniform_filter1d(values, max(p.count // _SLOW_PARTS, 1)))
+        return engine.rms(_slow_part(p, values))
     wanders = slow(best.residual)
     for cause, change in added.items():
         if cause in turned_back or slow(change) <= _SLOW_SHARE * engine.rms(change):
@@ -218,14 +218,18 @@ def _as_slow(engine, best, added, takes):
     return found
 
 
+def _slow_part(problem, values):
+    """Running mean over a part of the record."""
+    return uniform_filter1d(values, max(problem.count // _SLOW_PARTS, 1))
+
+
 def _is_as_strong_fast(problem, best, change):
     """Whether the part of what a cause adds that is not slow is there as well, as strong: of that,
     noise with a long memory has little, and what has none of it is only slow.
 
     The uncertainty of its strength is by parts of the record (cluster-robust).
     """
-    length = max(problem.count // _SLOW_PARTS, 1)
-    fast, left = (values - uniform_filter1d(values, length) for values in (change, best.residual))
+    fast, left = (values - _slow_part(problem, values) for values in (change, best.residual))
     parts = np.array_split(np.flatnonzero(problem.used), _SLOW_PARTS)
     energy = np.array([fast[rows] @ fast[rows] for rows in parts])
     more = np.array([fast[rows] @ left[rows] for rows in parts])

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import INTERFERENCE, Effect, Reading
-from .residual_power import likelihood, variance_law
+from .residual_power import law_likelihood, likelihood
 
 # Largest share of the time that counts as bursts, and how much louder than the noise they are.
 _MOST = 0.3
@@ -221,11 +221,8 @@ def _grows(error, output):
     # outliers count little in either law: the rest may say the constant as well as the mean
     constant = max(likelihood(error, np.full(len(error), power)) for power in
                    (np.mean(error**2), _quiet(error)))
-    found = []
-    for values in (output - output.mean(), slope, np.gradient(slope)):
-        noise, grown, _ = variance_law(error, values**2)
-        found.append(likelihood(error, noise + grown * values**2) - constant)
-    return max(found)
+    return max(law_likelihood(error, values**2) - constant
+               for values in (output - output.mean(), slope, np.gradient(slope)))
 
 
 def _allowed(count):

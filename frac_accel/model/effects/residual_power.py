@@ -41,6 +41,12 @@ def likelihood(error, variance):
     return float(-0.5 * np.sum(squares + np.log(variance)))
 
 
+def law_likelihood(error, square):
+    """The same with the variance that follows a square best, as a + b times it."""
+    noise, factor, _ = variance_law(error, square)
+    return likelihood(error, noise + factor * square)
+
+
 def follows(error, variance, measure):
     """Whether a law of the variance holds in all classes of a measure, as many samples in each.
 

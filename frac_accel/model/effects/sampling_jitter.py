@@ -1,12 +1,13 @@
 """Instants of sampling that scatter."""
 
 import dataclasses
+from itertools import chain
 
 import numpy as np
 
 from ..parameters import parameter
 from .base import STAMPS, Effect, Reading
-from .residual_power import follows, likelihood, slope_of, variance_law
+from .residual_power import follows, law_likelihood, likelihood, slope_of, variance_law
 
 # Standard deviations by which the residual's power must follow the slope's, the logarithm of the
 # likelihood by which the slope must beat any other measure of the motion, and the share of the
@@ -48,8 +49,7 @@ class SamplingJitter(Effect):
     @classmethod
     def recognised(cls, seen, shown):
         """The residual's power is noise and J**2 times the slope's, sample by sample."""
-        from scipy.ndimage import uniform_filter1d  # here, as the corrector needs nothing of them
-        from scipy.signal import oaconvolve
+        from scipy.signal import oaconvolve  # here, as the corrector needs nothing of it
         around = seen.of_one_error
         if seen.found.jitter_rms_s or around is None:
             return None  # stamps that scatter do the same, and so do values between samples
@@ -63,35 +63,25 @@ class SamplingJitter(Effect):
 
         def of_errors(power):
             return oaconvolve(power, around**2, "same")[used]
-        squares = {"slope": of_errors(slope**2), "level": of_errors(level**2),
-                   "bend": of_errors(bend**2)}
-        noise, factor, std = variance_law(error, squares["slope"])
+        of_slope = of_errors(slope**2)
+        noise, factor, std = variance_law(error, of_slope)
         if seen.is_coarse:
             # what rounding makes of a small signal follows its slope as well
-            factor -= max(variance_law(seen.rounding()[used], squares["slope"])[1], 0.0)
-        share = factor * squares["slope"].mean() / np.mean(error**2)
+            factor -= max(variance_law(seen.rounding()[used], of_slope)[1], 0.0)
+        share = factor * of_slope.mean() / np.mean(error**2)
         if factor < _SIGNIFICANT * std or share < _SHARE:
             return None
-        own = likelihood(error, noise + factor * squares["slope"])
-        period = 2 * np.pi * np.sqrt(np.mean(slope[used]**2) / max(np.mean(bend[used]**2), 1e-300))
-
-        def others():
-            yield squares["level"]
-            yield squares["bend"]
-            for periods in _PERIODS:
-                length = min(max(int(periods * period), 1), len(level))
-                for values in (slope, level, bend):
-                    yield of_errors(uniform_filter1d(values**2, length))
-        for square in others():
-            constant, grows, _ = variance_law(error, square)
-            if own - likelihood(error, constant + grows * square) < _BETTER:
-                return None
+        own = likelihood(error, noise + factor * of_slope)
+        of_level = of_errors(level**2)
+        others = chain([of_level], map(of_errors, _other_powers(level, slope, bend, used)))
+        if any(own - law_likelihood(error, square) < _BETTER for square in others):
+            return None
         # of the next order: a normal shift to the power of four is three times its variance's
         # square on average
-        both = squares["slope"] + factor * of_errors(0.75 * bend**2 + slope * slope_of(bend))
+        both = of_slope + factor * of_errors(0.75 * bend**2 + slope * slope_of(bend))
         noise, factor, std = variance_law(error, both)
         power = noise + factor * both
-        if not all(follows(error, power, squares[name]) for name in ("slope", "level")):
+        if not all(follows(error, power, square) for square in (of_slope, of_level)):
             return None
         shift = error * slope[used] / power
         alike = np.correlate(around, around, "full")[len(around):] / (around @ around)
@@ -99,7 +89,7 @@ class SamplingJitter(Effect):
                for lag, own in zip((1, 2, 3), np.r_[alike, np.zeros(3)])):
             return None
         # what is faster than what is compared has instants that scatter, too
-        known = squares["slope"].mean() / np.sum(around**2)
+        known = of_slope.mean() / np.sum(around**2)
         less = known / (known + seen.slope_beyond(np.mean(error**2)))
         rms = float(np.sqrt(less * factor))
         # the sum of all errors says it, too: by as much as it says otherwise the law may be wrong
@@ -113,3 +103,15 @@ class SamplingJitter(Effect):
             {"rms_s": float(uncertain / rate)}, error, after,
             f"the error's power follows the square of the slope: {share:.0%} of it, "
             f"{factor / std:.3g} standard deviations from none")
+
+
+def _other_powers(level, slope, bend, used):
+    """What else noise may grow with than the motion's level: the power of its bend at each instant,
+    and of all three over some of its periods."""
+    from scipy.ndimage import uniform_filter1d
+    yield bend**2
+    period = 2 * np.pi * np.sqrt(np.mean(slope[used]**2) / max(np.mean(bend[used]**2), 1e-300))
+    for periods in _PERIODS:
+        length = min(max(int(periods * period), 1), len(level))
+        for values in (slope, level, bend):
+            yield uniform_filter1d(values**2, length)
