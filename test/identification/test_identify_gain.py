@@ -5,7 +5,7 @@ import pytest
 import shaken
 from exact_sines import oscillator, record, samples
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from frac_accel import Samples, diagnose, identify
 from frac_accel.model.core import Gain, Oscillator
@@ -103,3 +103,20 @@ def test_a_delay_longer_than_the_ends_that_do_not_count(late_s):
     assert abs(own["value"] - 1.05) < 4 * own["std"] and own["std"] < 2e-4
     assert found.parameters["delay_s"]["value"] == pytest.approx(late_s, abs=1e-4)
     assert found.nrmse < 0.008 and found.held_out_nrmse < 0.008
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_reference_that_is_far_slower_than_the_sensor(seed):
+    """Thermometers on one mast, one in a shield: no delay within a model's reach makes up for it,
+    and what no model may hold is not said."""
+    rng = np.random.default_rng([20261128, seed])
+    samples, fine = 3600, 20
+    corner_hz = 10**rng.uniform(-2.9, -2.3)
+    moving = rng.normal(size=(samples + 2000) * fine)
+    for lag_hz in (5e-4, corner_hz):
+        fast, moving = moving, lfilter(*butter(1, lag_hz, fs=fine), moving)
+    fast, slow = (values[2000 * fine::fine][:samples] / fast.std() for values in (fast, moving))
+    found = identify((slow + 0.1 * rng.normal(size=samples), fast + 0.02 * rng.normal(size=samples)
+                      + 0.002 * np.cumsum(rng.normal(size=samples))), sampling_rate_hz=1.0)
+    assert isinstance(found.model.core, Gain)
+    assert abs(found.parameters["delay_s"]["value"]) <= 10

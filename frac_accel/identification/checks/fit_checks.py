@@ -5,11 +5,10 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from ...errors import IdentificationError
 from ...model.core import Oscillator
-from ..fit.output_error import fit_output_error
+from ...model.effects import longest_identified
+from ..fit.output_error import LONGEST_DELAY, fit_output_error, longest_delay
 from ..fit.structures import OscillatorStructure
 
-# The search for a delay goes no further than this share of the record.
-_LONGEST_DELAY = 0.25
 # Samples that two topics far apart must share, and the residual, of the output, that a sensor has
 # there if they belong together.
 _FEWEST_SHARED = 256
@@ -37,7 +36,7 @@ def require_time_to_answer(fit, pair):
         sensor's free motion decays more slowly than the record lasts.
     """
     duration = len(pair) / pair.sampling_rate_hz
-    if abs(fit["delay_s"]) > 0.99 * _LONGEST_DELAY * duration:
+    if abs(fit["delay_s"]) > 0.99 * LONGEST_DELAY * duration:
         raise _too_late(fit["delay_s"], duration)
     if "natural_frequency_hz" in fit.names:
         _require_memory(fit, duration)
@@ -59,7 +58,7 @@ def far_apart(reference, sensor, pair):
     x, y = (np.where(valid, values - values[valid].mean(), 0.0) for values in (reference, sensor))
     size = next_fast_len(2 * n, real=True)
     shared = np.abs(irfft(np.conj(rfft(x, size)) * rfft(y, size), size))
-    nearest = int(_LONGEST_DELAY * n) + 1
+    nearest = int(longest_delay(n, pair.sampling_rate_hz)) + 1
     lags = np.arange(nearest, n - _FEWEST_SHARED + 1)
     if not len(lags):
         return None
@@ -105,7 +104,9 @@ def _require_memory(fit, duration):
 
 def _too_late(delay_s, duration_s):
     later = "later" if delay_s > 0 else "earlier"
+    longest_s = longest_identified("delay_s")
+    expected, why = ("less than a quarter of it", ", or the record is too short") \
+        if LONGEST_DELAY * duration_s < longest_s else (f"at most {longest_s:g} s", "")
     return IdentificationError(
         f"the sensor is {abs(delay_s):.4g} s {later} than the reference in a record of "
-        f"{duration_s:.4g} s, expected less than a quarter of it: the stamps of one topic are "
-        "wrong, or the record is too short")
+        f"{duration_s:.4g} s, expected {expected}: the stamps of one topic are wrong{why}")

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.fft import rfft
 
 from ...errors import IdentificationError
+from ...model.effects import longest_identified
 from ...signals.convolution import Convolution, exponentials
 from ...signals.kept import kept
 from ...signals.normal_equations import solve
@@ -58,6 +59,9 @@ _TRIAL_ITERATIONS = 5
 _UNRELATED = 10
 # Share from which such a record may as well belong together.
 _SOME = 0.1
+# The search for a delay goes no further than this share of the record.
+LONGEST_DELAY = 0.25
+_ROUNDING = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -195,6 +199,12 @@ def fit_output_error(structure, reference, sensor, sampling_rate_hz, valid=None,
     return problem.result(state, uncertainty)
 
 
+def longest_delay(samples, sampling_rate_hz):
+    """Delay that is searched for in a record, in samples: a model must be able to hold it."""
+    longest_s = longest_identified("delay_s") * (1 - _ROUNDING)
+    return min(LONGEST_DELAY * samples, longest_s * sampling_rate_hz)
+
+
 class _Problem:
     """Unknowns of the search: the structure's own and the delay in samples."""
 
@@ -227,7 +237,8 @@ class _Problem:
             raise IdentificationError("the sensor's output is constant where it counts")
         self.reference, self.whole = reference, sensor
         low, high = structure.bounds(rate, self.n)
-        self.low, self.high = np.r_[low, -self.n / 4], np.r_[high, self.n / 4]
+        reach = longest_delay(self.n, rate)
+        self.low, self.high = np.r_[low, -reach], np.r_[high, reach]
         for place, value in (held or {}).items():
             self.low[place] = self.high[place] = value
 

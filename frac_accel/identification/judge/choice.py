@@ -105,8 +105,10 @@ def _flat_instead(candidates):
         highest = min(highest, data.pair.band_hz or np.inf)
         # such a one may have integrated the motion to follow a zero that wanders
         nothing = classical.held_out_nrmse > 1
+        # no sensor's delay is as long as the search goes
+        astray = "delay_s" in classical.fit.at_bounds
         in_sight = (resonance < _IN_SIGHT * highest and std < _UNDETERMINED * resonance
-                    and not nothing)
+                    and not nothing and not astray)
         if in_sight and not _without_its_delay(classical.fit, highest):
             return None
         flat = candidates["gain"]
@@ -118,6 +120,8 @@ def _flat_instead(candidates):
     left = flat.held_out_nrmse
     if left <= _NO_BETTER * classical.held_out_nrmse:
         why = "does not predict clearly better than a gain"
+    elif astray:
+        why = f"needs {classical.fit['delay_s']:.3g} s of delay, and the search goes no further"
     elif share > _TAKEN_BACK and (
             not in_sight or classical.held_out_nrmse > _CLEARLY * left):
         why = (f"would answer {lead:.3g} s before the reference moves, as if that were smoothed; "

@@ -10,6 +10,7 @@ import pkgutil
 from importlib.metadata import entry_points
 
 from ...errors import ModelError
+from ..parameters import parameter_fields
 from .base import Circumstances, Effect
 
 __all__ = ["IDENTIFIED", "Circumstances", "Effect", "broken_extensions", "effect_names",
@@ -96,6 +97,11 @@ IDENTIFIED = {effect.identified_as: effect for effect in _own().values() if effe
 def identified_effect(parameter, value):
     """Effect that states what ``identify`` found beside a core, such as ``delay_s``."""
     return IDENTIFIED[parameter](value)
+
+
+def longest_identified(parameter):
+    """Largest value that a model may hold of what ``identify`` finds beside a core."""
+    return parameter_fields(IDENTIFIED[parameter])[0].metadata["maximum"]
 
 
 def fault_of_reference(effect):
