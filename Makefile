@@ -13,7 +13,7 @@ venv := .venv
 oldest := .venv-oldest
 docs := .venv-docs
 python := $(venv)/bin/python
-numerical := -m pytest -n 2
+numerical := -m pytest -n 2 --durations 25
 # What no numerical library's age can change: packages, pages, nodes, workers and the command line;
 # and most searches, of which those of the commands are enough.
 not_numerical := $(addprefix --ignore=test/,package report nodes diagnosis \

@@ -8,7 +8,7 @@ from scipy.ndimage import uniform_filter1d
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.core import Oscillator
-from ..model.effects.base import CROSS_AXIS, OFFSET, Effect
+from ..model.effects.base import CROSS_AXIS, GAIN, OFFSET, Effect
 from .courses import with_level
 from .engine import LONG, WEIGHS
 from .gradual import gradual
@@ -35,6 +35,8 @@ _MOST_OF = 0.5
 # one imitates another to a per cent. Several filters may in any case. Likewise what changes with
 # time.
 _RESEMBLES, _IMITATES, _MOSTLY = 30.0, 100.0, 0.5
+# Share of what a filter changes (power) that lies where it acts.
+_ACTS = 0.9
 # Times what is left (RMS) that every set without a cause must leave for it to be like no other.
 _FAR_BEHIND = 5.0
 # Share of what is left that its linear part surely must have to count.
@@ -48,6 +50,8 @@ _ALIKE, _TELLS_LAW = 0.8, 5.0
 # adds (RMS) from which it is slow. Then it must take so many times what is left wanders by: the
 # best step in noise with a long memory takes three to four times that.
 _SLOW_PARTS, _SLOW_SHARE, _SLOW_TIMES = 20, 0.5, 6.0
+# Times the median size of what is left from which it stands out.
+_OUTLYING = 10.0
 # Share of its strength by which the part of it that is not slow may be stronger or weaker.
 _AS_STRONG = 0.1
 # Scatter of what a constant adds, over it: a dead zone, or samples that do not count, make some.
@@ -147,7 +151,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
             doubts.setdefault(cause, words)
     for cause, words in {**by_what_is_left(engine, best, takes, left),
                          **_acausal(engine, best, stds), **_of_the_model(engine, best),
-                         **_as_slow(engine, best, added, takes),
+                         **_as_slow(engine, best, added, takes), **_of_level(engine, best, added),
                          **with_level(engine, best, added),
                          **otherwise_in_bands(engine, best, added),
                          **gradual(engine, best, gains)}.items():
@@ -218,6 +222,34 @@ def _as_slow(engine, best, added, takes):
     return found
 
 
+def _of_level(engine, best, added):
+    """What changes the gain, or the zero, along the record of a motion far from zero, as a pressure
+    is: either does nearly what the other does, and only what goes with the motion about its level
+    tells which."""
+    p, found = engine.problem, {}
+    for cause, change in added.items():
+        effect = best.effects[cause]
+        if effect.everyday or not effect.shows_with_time or effect.stage not in (GAIN, OFFSET):
+            continue
+        if effect.stage == OFFSET:
+            motion = p.simulate({name: other for name, other in best.effects.items()
+                                 if other.stage < OFFSET})
+            other, course, gain = "gain", change, change * motion / (motion[p.used].mean() or 1.0)
+        else:
+            circumstances = p.simulator(p.axis).circumstances
+            other, course, gain = "zero", effect.simulate(np.ones(len(change)), circumstances), \
+                change
+        zeros = np.stack([np.ones(p.count), course[p.used]], axis=1)
+        own = np.zeros(len(change))
+        own[p.used] = gain[p.used] - zeros @ np.linalg.lstsq(zeros, gain[p.used])[0]
+        apart, rest = engine.rms(own), engine.rms(best.residual)
+        if apart < min(_MOSTLY * engine.rms(change), WEIGHS * rest) \
+                and not _is_as_strong(p, own, best.residual):
+            found[cause] = (f"a {other} with that course does the same but for {apart:.3g} RMS, "
+                            f"and {rest:.3g} are left")
+    return found
+
+
 def _slow_part(problem, values):
     """Running mean over a part of the record."""
     return uniform_filter1d(values, max(problem.count // _SLOW_PARTS, 1))
@@ -226,13 +258,23 @@ def _slow_part(problem, values):
 def _is_as_strong_fast(problem, best, change):
     """Whether the part of what a cause adds that is not slow is there as well, as strong: of that,
     noise with a long memory has little, and what has none of it is only slow.
-
-    The uncertainty of its strength is by parts of the record (cluster-robust).
     """
-    fast, left = (values - _slow_part(problem, values) for values in (change, best.residual))
+    return _is_as_strong(problem, *(values - _slow_part(problem, values)
+                                    for values in (change, best.residual)))
+
+
+def _is_as_strong(problem, change, left):
+    """Whether a part of what a cause adds is there as strong as the cause says, beside what is
+    left.
+
+    The uncertainty of its strength is by parts of the record (cluster-robust); what stands far out
+    of the rest counts as if it only just did.
+    """
+    most = _OUTLYING * np.median(np.abs(left[problem.used]))
+    left = np.clip(left, -most, most)
     parts = np.array_split(np.flatnonzero(problem.used), _SLOW_PARTS)
-    energy = np.array([fast[rows] @ fast[rows] for rows in parts])
-    more = np.array([fast[rows] @ left[rows] for rows in parts])
+    energy = np.array([change[rows] @ change[rows] for rows in parts])
+    more = np.array([change[rows] @ left[rows] for rows in parts])
     if not energy.sum() > 0:
         return False
     off = more.sum() / energy.sum()
@@ -264,6 +306,8 @@ def left_open(engine, fitted, stds, causes):
     core, found = p.baseline.axis(p.axis).core, {}
     for cause in causes:
         places = [(u, place) for u, place in zip(fitted.unknowns, fitted.theta) if u.cause == cause]
+        if not places:
+            continue  # read off the record
         words = undetermined(fitted.effects[cause], *zip(*places), stds[cause], core, p.time[-1])
         if words:
             found[cause] = words
@@ -320,6 +364,19 @@ def _imitators(engine, best, takes, left):
               and cause not in clear
               and not _stands_out_at_its_peak(engine, best, cause, takes[cause])]
     return dict.fromkeys(linear, more.format(share))
+
+
+def stands_in_its_band(engine, fitted, cause):
+    """Whether what a cause takes stands far out of all that is left at the frequencies at which it
+    acts, whatever is left at others."""
+    used = engine.problem.used
+    change, left = (np.abs(np.fft.rfft(values * used))**2
+                    for values in (engine.added(fitted, cause), fitted.residual))
+    order = np.argsort(change)[::-1]
+    acts = order[:1 + int(np.searchsorted(np.cumsum(change[order]), _ACTS * change.sum()))]
+    there = left[acts].sum() / max(left.sum(), 1e-300)
+    return bool(engine.takes(fitted, cause)
+                > _RESEMBLES * math.sqrt(there) * engine.rms(fitted.residual))
 
 
 def _is_like_no_other(engine, best, cause):

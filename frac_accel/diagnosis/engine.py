@@ -290,13 +290,15 @@ class Engine:
         return any(special_case(effect, stds.get(cause, {}), core)
                    for cause, effect in fitted.effects.items())
 
-    def instead(self, best, unwanted):
+    def instead(self, best, unwanted, before=frozenset()):
         """A set that another cause describes better where some are not wanted; or the rest.
 
         Parameters
         ----------
         best : Fitted
         unwanted : set of str
+        before : set of str
+            Those that were not wanted in the sets before it.
         """
         rest = self.search.fit({cause: effect for cause, effect in best.effects.items()
                                 if cause not in unwanted})
@@ -323,7 +325,7 @@ class Engine:
         if found.cost - known.cost > self.threshold(known):
             found = self.search.prune(known, self.threshold)
         # what was found beside the unwanted has met its rivals beside them only
-        return self.compete(found, unwanted)
+        return self.compete(found, unwanted | before)
 
     def everyday(self):
         """The smallest set of everyday causes."""

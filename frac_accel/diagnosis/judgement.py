@@ -127,8 +127,9 @@ def _settled(engine, best, noise_std, known=None):
                     if not there.best.effects[cause].everyday} or unwanted
         if not unwanted:
             break
+        other = engine.instead(there.best, unwanted, gone.keys())
         gone |= {cause: there.doubts[cause] for cause in unwanted}
-        there = _examined(engine, engine.instead(there.best, unwanted), noise_std, known)
+        there = _examined(engine, other, noise_std, known)
         # one that is doubtful, too, may lead to another that is not
         if not there.doubts.keys() - constants_of(there.best.effects):
             if there.gains.keys() - here.gains.keys():

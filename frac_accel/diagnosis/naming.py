@@ -10,7 +10,14 @@ from ..errors import FracAccelError
 from ..model import is_link
 from ..model.effects import IDENTIFIED, fault_of_reference
 from ..model.effects.base import OFFSET
-from .doubts import by_what_is_left, least_lead, left_open, resembles, within_own_delay
+from .doubts import (
+    by_what_is_left,
+    least_lead,
+    left_open,
+    resembles,
+    stands_in_its_band,
+    within_own_delay,
+)
 from .engine import WEIGHS
 from .experiments import separating_experiment
 from .finding import Finding
@@ -26,6 +33,8 @@ _STEADY = 0.2
 _MINOR, _MINOR_FILTER = 0.1, 0.05
 # Share by which a parameter may move when what is only suspected is left out.
 _OTHERS = 0.25
+# The same of a filter beside which nothing else acts in its band.
+_STAYS = 0.05
 # Standard uncertainties from the model's own value by which a parameter has moved.
 _MOVED = 5.0
 
@@ -109,6 +118,16 @@ def _are_minor(engine, best, missing, named):
                for cause in missing)
 
 
+def _stays(engine, best, fitted, cause):
+    """Whether a filter is the same without what is only suspected, and stands far out of all that
+    is left beside that in its own band: what is missing acts elsewhere."""
+    one, other = best.effects[cause], fitted.effects[cause]
+    return is_link(one) and stands_in_its_band(engine, best, cause) and all(
+        abs(getattr(other, unknown.name) - getattr(one, unknown.name))
+        < _STAYS * abs(getattr(one, unknown.name))
+        for unknown in best.unknowns if unknown.cause == cause)
+
+
 def refitted(engine, best, named, tied):
     """The causes that are named, fitted without the others; their uncertainties; and, in words,
     those that are no longer to be named then.
@@ -135,7 +154,9 @@ def refitted(engine, best, named, tied):
                 {c: e for c, e in best.effects.items() if c in named | constant or c in base}))
             stds = engine.uncertainties(fitted)
             takes = {c: engine.rms(engine.added(fitted, c)) for c in named & fitted.causes}
-            found = {**by_what_is_left(engine, fitted, takes, engine.left_beside_noise(fitted)),
+            found = {**{c: words for c, words in by_what_is_left(
+                engine, fitted, takes, engine.left_beside_noise(fitted)).items()
+                if not _stays(engine, best, fitted, c)},
                      **left_open(engine, fitted, stds, takes),
                      **{c: "without what is only suspected its parameters are others"
                         for c in takes if not engine.agrees(best, known, [c], fitted, _OTHERS)},

@@ -676,6 +676,13 @@ class Problem:
         return [self._unknown(effect, field) for field in parameter_fields(type(effect))
                 if field.name in names]
 
+    def within(self, effect, name, value):
+        """The value nearest to one that a parameter of an effect may have, if it is fitted."""
+        for unknown in self.unknowns(effect):
+            if unknown.name == name and not unknown.logarithmic:
+                return np.clip(value, unknown.low * unknown.scale, unknown.high * unknown.scale)
+        return value
+
     def _unknown(self, effect, field):
         limits = field.metadata
         scale = self.scales.of(field, getattr(effect, field.name))

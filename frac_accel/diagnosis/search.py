@@ -431,11 +431,13 @@ class Search:
             return None
         if start.kind in ("finite", "weak"):
             factor = np.clip(factor, _REACH[0] if start.kind == "finite" else 0.0, _REACH[1])
-        cost += share * (factor**2 * size - 2 * factor * shared)
         effect = start.effect
         if start.parameter:
-            scaled = factor * getattr(effect, start.parameter)
+            one = getattr(effect, start.parameter)
+            scaled = p.within(effect, start.parameter, factor * one)
+            factor = scaled / one
             effect = dataclasses.replace(effect, **{start.parameter: float(scaled)})
+        cost += share * (factor**2 * size - 2 * factor * shared)
         return cost, cause, effect
 
     def run(self, threshold, promises, done, seed=None, held=()):

@@ -8,6 +8,7 @@ from sampled_pair import sampled_pair
 from scipy.signal import butter, sosfiltfilt
 
 from frac_accel import SensorModel, diagnose
+from frac_accel.diagnosis.doubts import left_open
 from frac_accel.diagnosis.naming import moved
 from frac_accel.diagnosis.verdict import _kept
 from frac_accel.model.core import Gain
@@ -114,3 +115,11 @@ def test_what_a_free_motion_describes_is_in_no_model_file(is_written, monkeypatc
 def test_what_was_open_and_gave_way_to_another_cause_has_not_moved():
     engine = SimpleNamespace(loose={"sensitivity_error": None})
     assert moved(engine, SimpleNamespace(effects={}), {}, "") == ([], {})
+
+
+def test_what_the_record_shows_by_itself_is_not_open():
+    """It has no unknown in a fit, and no uncertainty there; that was a traceback."""
+    noise = effect_of("reference_noise")(0.1, (0.0, 1.0), (1.0, 0.0))
+    problem = SimpleNamespace(baseline=SensorModel(Gain(1.0)), axis=0, time=np.arange(9.0))
+    fitted = SimpleNamespace(unknowns=(), theta=(), effects={noise.cause: noise})
+    assert left_open(SimpleNamespace(problem=problem), fitted, {}, {noise.cause}) == {}

@@ -54,3 +54,35 @@ def test_a_limit_that_was_never_reached_has_no_number():
     clipping, = found.findings
     assert list(clipping.as_dict()["parameters"]) == ["upper"]
     assert found.unexplained_fraction < 0.01
+
+
+def far_from_zero(seed, course, count=5000):
+    """A barometer, and a height made of it: slow, smoothed, with a drift of its zero or gain, and
+    a wandering that no cause says."""
+    rng, fine = np.random.default_rng([20261128, seed]), 10
+    slow, fast = (sosfilt(butter(order, corner, fs=fine, output="sos"),
+                          rng.normal(size=(count + 1000) * fine))
+                  for order, corner in ((1, 1 / 3000), (2, 0.02)))
+    motion = 8 * slow / slow.std() + rng.uniform(1, 3) * fast / fast.std()
+    smooth = np.convolve(motion, np.full(8 * fine, 1 / (8 * fine)))[:len(motion)]
+    motion, smooth = (1000 + values[1000 * fine::fine] for values in (motion, smooth))
+    gain, drift = -rng.uniform(0.07, 0.12), rng.uniform(1e-3, 2e-3) * np.arange(count)
+    output = gain * smooth + drift if course == "offset_drift" \
+        else gain * smooth * (1 + drift / (1000 * gain))
+    wandering = 0.0015 * np.cumsum(rng.normal(size=count)) + 0.004 * rng.normal(size=count)
+    return np.round(motion, 1), np.round(output + 90 + wandering, 2)
+
+
+@pytest.mark.parametrize("course, seed", [("offset_drift", 6), ("offset_drift", 7),
+                                          ("gain_drift", 5), ("gain_drift", 3)])
+def test_a_course_of_the_zero_or_of_the_gain(course, seed):
+    """Far from zero either does nearly what the other does: the wrong one is never named."""
+    found = diagnose(far_from_zero(seed, course), sampling_rate_hz=1.0)
+    named = {finding.cause for finding in found.findings}
+    assert not named & ({"gain_drift", "offset_drift"} - {course})
+
+
+def test_a_start_of_the_search_stays_within_the_limits():
+    """Where a clock seems to be off by more than any is, the search does not begin there."""
+    found = diagnose(far_from_zero(2, "offset_drift"), sampling_rate_hz=1.0)
+    assert found.verdict == "unexplained"
