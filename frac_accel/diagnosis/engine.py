@@ -338,21 +338,22 @@ class Engine:
         return {cause: effect for cause, effect in effects.items()
                 if cause not in self.search.base}
 
-    def rivals(self, best, cause, may_be_more=False):
+    def rivals(self, best, cause, may_be_more=False, close=_CLOSE):
         """Sets without a cause, no larger than the best, by score; (margin, causes).
 
         Where what is left `may_be_more` than noise, of a lead that only shows where little is left
-        no more counts than the loudest noise would let show: it may favour either.
+        no more counts than the loudest noise would let show: it may favour either. A margin up to
+        which two say the same is `close`.
         """
         if self.comparing(cause) is not self:
-            return self.part.rivals(self.part.best, cause, may_be_more)
+            return self.part.rivals(self.part.best, cause, may_be_more, close)
         variance = self._variance(best)
         found = [(self._margin(fit, best, variance, may_be_more), fit.causes) for fit in
                  self.search.fits.values()
                  if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
         # a hollow one that is close says the same in other words
         return [entry for entry in sorted(found, key=lambda entry: entry[0])
-                if entry[0] > _CLOSE or not self.hollow(self.search.fits[entry[1]])]
+                if entry[0] > close or not self.hollow(self.search.fits[entry[1]])]
 
     def margin_of_all(self, best, cause):
         """Margin by which a set is ahead of one that leaves twice the power; what is left and is no

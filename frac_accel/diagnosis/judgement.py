@@ -63,14 +63,15 @@ def judge(engine, best, found, shown, noise_std=None):
     most = max((g.taken for g in gains.values()), default=0.0)
     for cause, g in gains.items():
         mirror = best.effects[cause].mirrors
-        rivals = [(margin, causes) for margin, causes in engine.rivals(best, cause, nearly > 0)
+        of_all = engine.margin_of_all(best, cause)
+        clear = max(_CLEAR, nearly * of_all)
+        rivals = [(margin, causes) for margin, causes in engine.rivals(best, cause, nearly > 0,
+                                                                       clear)
                   # what cannot be named does not stand in the way of what can
                   if (not mirror or mirror not in causes) and not causes & doubted.keys()]
         alone = engine.stands_alone(best, cause, g.taken)
         margin, other = (np.inf, frozenset()) if alone or not rivals else rivals[0]
         instead = sorted(other - best.causes)
-        of_all = engine.margin_of_all(best, cause)
-        clear = max(_CLEAR, nearly * of_all)
         if any(effect_of(name).needs_temperature for name in instead):
             clear = max(clear, _AS_MEASURED * g.taken**2 * of_all * engine.problem.count
                         / best.cost)
@@ -117,7 +118,7 @@ def _settled(engine, best, noise_std, known=None):
     here = _examined(engine, best, noise_std, known)
     here, dropped = _without_the_weakest(engine, _instead_of_idle(
         engine, best, here, noise_std, known), noise_std, known)
-    there, gone = here, {}
+    there, gone, others = here, {}, []
     for _ in range(_AGAIN):
         # what cannot be named must not stand in the way of what can
         unwanted = {cause for cause in there.doubts.keys() - constants_of(there.best.effects)
@@ -135,6 +136,7 @@ def _settled(engine, best, noise_std, known=None):
             if there.gains.keys() - here.gains.keys():
                 here, dropped = there, {**dropped, **gone}
             break
+        others.append((there, dict(gone)))
     core = engine.core(here.best) if here.doubts else None
     if core:
         there = _examined(engine, core, noise_std, known)
@@ -145,16 +147,23 @@ def _settled(engine, best, noise_std, known=None):
                             if cause not in there.gains})
             here = there
     if here.doubts:
-        standing = here.gains.keys() - here.doubts.keys()
-        gone = {**here.doubts, **refitted(engine, here.best, standing, {})[2]}
-        # an offset is one whatever else is not understood
-        there = None if standing - gone.keys() else \
-            _examined(engine, engine.everyday(), noise_std, known)
-        if there and there.gains.keys() - there.doubts.keys():
-            dropped.update({cause: words for cause, words in gone.items()
-                            if cause not in there.gains})
-            here = there
+        told = {**here.doubts, **_no_longer(engine, here)}
+        if here.gains.keys() <= told.keys():
+            # an offset is one whatever else is not understood
+            others.append((_examined(engine, engine.everyday(), noise_std, known), {}))
+            for there, gone in others:
+                if there.gains.keys() - there.doubts.keys() - _no_longer(engine, there).keys():
+                    dropped.update({cause: words for cause, words in {**told, **gone}.items()
+                                    if cause not in there.gains})
+                    here = there
+                    break
     return here, dropped
+
+
+def _no_longer(engine, examined):
+    """Causes that nothing speaks against in a set, but do not stand without the others; in words.
+    """
+    return refitted(engine, examined.best, examined.gains.keys() - examined.doubts.keys(), {})[2]
 
 
 def _instead_of_idle(engine, best, here, noise_std, known):

@@ -90,6 +90,12 @@ def _with_identified(engine, best, fitted, stds):
     odd = [cause for cause in fitted.causes - engine.search.base.keys()
            if not fitted.effects[cause].everyday]
     effects = fitted.effects.values()
+    level = IDENTIFIED["offset"](0.0)
+    if any(fitted.effects[cause].adds for cause in odd) and level.cause not in fitted.effects:
+        # a course of the zero begins anywhere
+        fitted = engine.search.to_its_best(
+            engine.search.fit({level.cause: level, **fitted.effects}))
+        stds = engine.uncertainties(fitted)
     if any(effect.clock_ratio() != 1 or effect.time_steps() for effect in effects) \
             and not any(delay.cause in (effect.cause, effect.mirrors) for effect in effects):
         # with the orders of filters that were found without it
