@@ -10,6 +10,7 @@ from ..errors import FracAccelError
 from ..model import is_link
 from ..model.effects import IDENTIFIED, fault_of_reference
 from ..model.effects.base import OFFSET
+from .courses import with_level
 from .doubts import (
     by_what_is_left,
     least_lead,
@@ -90,12 +91,6 @@ def _with_identified(engine, best, fitted, stds):
     odd = [cause for cause in fitted.causes - engine.search.base.keys()
            if not fitted.effects[cause].everyday]
     effects = fitted.effects.values()
-    level = IDENTIFIED["offset"](0.0)
-    if any(fitted.effects[cause].adds for cause in odd) and level.cause not in fitted.effects:
-        # a course of the zero begins anywhere
-        fitted = engine.search.to_its_best(
-            engine.search.fit({level.cause: level, **fitted.effects}))
-        stds = engine.uncertainties(fitted)
     if any(effect.clock_ratio() != 1 or effect.time_steps() for effect in effects) \
             and not any(delay.cause in (effect.cause, effect.mirrors) for effect in effects):
         # with the orders of filters that were found without it
@@ -134,6 +129,13 @@ def _stays(engine, best, fitted, cause):
         for unknown in best.unknowns if unknown.cause == cause)
 
 
+def _with_level(effects):
+    """Effects with a level beside what changes the zero, which begins anywhere."""
+    level = IDENTIFIED["offset"](0.0)
+    changes = any(effect.adds and not effect.everyday for effect in effects.values())
+    return {level.cause: level, **effects} if changes else effects
+
+
 def refitted(engine, best, named, tied):
     """The causes that are named, fitted without the others; their uncertainties; and, in words,
     those that are no longer to be named then.
@@ -155,14 +157,17 @@ def refitted(engine, best, named, tied):
     if named and missing and _are_minor(engine, best, missing, named):
         return best, stds, {}
     while True:
-        if named | constant != fitted.causes - base:
-            fitted = engine.search.to_its_best(engine.search.fit(
-                {c: e for c, e in best.effects.items() if c in named | constant or c in base}))
+        kept = _with_level({c: e for c, e in best.effects.items()
+                            if c in named | constant or c in base})
+        if kept.keys() - base != fitted.causes - base:
+            fitted = engine.search.to_its_best(engine.search.fit(kept))
             stds = engine.uncertainties(fitted)
-            takes = {c: engine.rms(engine.added(fitted, c)) for c in named & fitted.causes}
+            added = {c: engine.added(fitted, c) for c in named & fitted.causes}
+            takes = {c: engine.rms(change) for c, change in added.items()}
             found = {**{c: words for c, words in by_what_is_left(
                 engine, fitted, takes, engine.left_beside_noise(fitted)).items()
                 if not _stays(engine, best, fitted, c)},
+                     **with_level(engine, fitted, added),
                      **left_open(engine, fitted, stds, takes),
                      **{c: "without what is only suspected its parameters are others"
                         for c in takes if not engine.agrees(best, known, [c], fitted, _OTHERS)},
