@@ -10,6 +10,7 @@ from .engine import WEIGHS
 from .finding import Finding
 from .gain import certainty
 from .naming import confidence, constants_of, refitted, suspect
+from .other_axes import as_they_show
 from .read_off import read_off
 from .verdict import Likely, verdict_on
 from .words import gain_words
@@ -212,7 +213,7 @@ def _examined(engine, best, noise_std, known):
     turned = _mirrored(engine, best)
     if turned is not best:
         best, gains = _relevant(engine, turned, known)
-    best = engine.search.to_its_best(best)
+    best = as_they_show(engine, engine.search.to_its_best(best))
     left = engine.left_beside_noise(best)
     noise = engine.established_noise(best, noise_std)
     stds = engine.uncertainties(best)

@@ -9,7 +9,7 @@ from scipy.special import expit
 from ..errors import FracAccelError
 from ..model import is_link
 from ..model.effects import IDENTIFIED, fault_of_reference
-from ..model.effects.base import OFFSET
+from ..model.effects.base import CROSS_AXIS, OFFSET
 from .courses import with_level
 from .doubts import (
     by_what_is_left,
@@ -32,6 +32,8 @@ _STEADY = 0.2
 # Share of what each named cause takes (RMS) up to which another one is minor; of a filter, which
 # may mend what a named one lacks.
 _MINOR, _MINOR_FILTER = 0.1, 0.05
+# Share of what comes across (RMS) that is a constant beside which the zero is fitted.
+_BROUGHT = 0.5
 # Share by which a parameter may move when what is only suspected is left out.
 _OTHERS = 0.25
 # The same of a filter beside which nothing else acts in its band.
@@ -129,11 +131,23 @@ def _stays(engine, best, fitted, cause):
         for unknown in best.unknowns if unknown.cause == cause)
 
 
-def _with_level(effects):
-    """Effects with a level beside what changes the zero, which begins anywhere."""
-    level = IDENTIFIED["offset"](0.0)
-    changes = any(effect.adds and not effect.everyday for effect in effects.values())
-    return {level.cause: level, **effects} if changes else effects
+def _with_level(engine, best, named):
+    """A fit with a level, where a named cause changes the zero, which begins anywhere, or brings a
+    constant of other axes, such as gravity, which a zero may do as well."""
+    level, used = IDENTIFIED["offset"](0.0), engine.problem.used
+    if level.cause in best.effects:
+        return best
+    for cause in named:
+        effect = best.effects[cause]
+        if effect.stage == CROSS_AXIS:
+            brought = engine.added(best, cause)
+            if abs(brought[used].mean()) < _BROUGHT * engine.rms(brought):
+                continue
+        elif effect.everyday or not effect.adds:
+            continue
+        return engine.search.to_its_best(
+            engine.search.fit({level.cause: level, **best.effects}))
+    return best
 
 
 def refitted(engine, best, named, tied):
@@ -145,7 +159,7 @@ def refitted(engine, best, named, tied):
     be bent. What is minor beside them stays in the model where all is said with it.
     """
     base, named, dropped = engine.search.base.keys(), named & best.effects.keys(), {}
-    fitted = best
+    fitted = best = _with_level(engine, best, named)
     stds = known = engine.uncertainties(best)
     constant = constants_of(best.effects) - base
     missing = best.causes - base - named - constant
@@ -157,10 +171,9 @@ def refitted(engine, best, named, tied):
     if named and missing and _are_minor(engine, best, missing, named):
         return best, stds, {}
     while True:
-        kept = _with_level({c: e for c, e in best.effects.items()
-                            if c in named | constant or c in base})
-        if kept.keys() - base != fitted.causes - base:
-            fitted = engine.search.to_its_best(engine.search.fit(kept))
+        if named | constant != fitted.causes - base:
+            fitted = engine.search.to_its_best(engine.search.fit(
+                {c: e for c, e in best.effects.items() if c in named | constant or c in base}))
             stds = engine.uncertainties(fitted)
             added = {c: engine.added(fitted, c) for c in named & fitted.causes}
             takes = {c: engine.rms(change) for c, change in added.items()}

@@ -88,6 +88,18 @@ def may_be_unlike(engine, best):
     return unlike.fit(best.effects).cost - best.cost < fitted.threshold(best)
 
 
+def as_they_show(engine, fitted):
+    """A fit whose effects say of the other axes what these show beside all that was found.
+
+    A search begins with what they show beside less: a delay between two axes looks like a turn.
+    """
+    p = engine.problem
+    shares, _ = p.mixing(fitted.effects)
+    effects = {cause: effect.with_other_axes(p.axis, shares)
+               for cause, effect in fitted.effects.items()}
+    return fitted if effects == fitted.effects else engine.search.again(effects)
+
+
 def fit_shares(problem, effects, output, rest):
     """Share of each other axis that describes what an output leaves (`EmpiricalFit`; its `order` is
     their number), learnt on all but the rows that are held out.

@@ -715,7 +715,7 @@ class Problem:
         axis i, NaN where either does not move; and the standard uncertainties as for white noise.
         """
         links = tuple(effect for effect in self.others.common(effects).values()
-                      if acts_before(effect))
+                      if acts_before(effect) or effect.pure_delay_s())
         return kept(self._mixings, links, self._mixing, links, most=2)
 
     def _mixing(self, links):

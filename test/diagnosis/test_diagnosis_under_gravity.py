@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from sampled_pair import sampled_pair
 from scipy.signal import butter, cheby1, sosfilt, sosfiltfilt
+from scipy.spatial.transform import Rotation
 
-from frac_accel import SensorModel, diagnose
+from frac_accel import Samples, SensorModel, diagnose
 from frac_accel.model.core import Gain
 
 RATE, COUNT, FINER = 200.0, 12_000, 8
@@ -86,3 +87,25 @@ def test_a_start_of_the_search_stays_within_the_limits():
     """Where a clock seems to be off by more than any is, the search does not begin there."""
     found = diagnose(far_from_zero(2, "offset_drift"), sampling_rate_hz=1.0)
     assert found.verdict == "unexplained"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_turn_under_gravity_is_known_as_well_as_the_zero_lets_it_be(seed):
+    """A zero of a hundredth of gravity does what a turn of 0.6 degrees does: the uncertainty was 25
+    times too small, as if there was none."""
+    rng = np.random.default_rng([149, seed])
+    count, rate = 4000, 50.0
+    motion = sosfiltfilt(butter(2, [0.05, 1.0], "band", fs=rate, output="sos"),
+                         rng.normal(size=(count, 3)), axis=0)
+    reference = motion / motion.std(axis=0) * [1.0, 1.2, 0.4] + [0, 0, 9.81]
+    angles = rng.uniform(1.0, 3.0, 3) * rng.choice([-1, 1], 3)
+    sensor = Rotation.from_euler("xyz", angles, degrees=True).inv().apply(reference)
+    sensor += [0, rng.choice([-1, 1]) * rng.uniform(0.05, 0.12), 0]
+    sensor += 0.03 * rng.normal(size=sensor.shape)
+    stamps = np.round(1e9 * np.arange(count) / rate)
+    found = diagnose(tuple(Samples.of(stamps, values) for values in (reference, sensor)),
+                     SensorModel(Gain(1.0)), axis="y")
+    turn, = (f for f in found.findings if f.cause == "misalignment")
+    roll, _, yaw = angles
+    assert abs(turn.effect.roll_deg - roll) < 4 * turn.std["roll_deg"]
+    assert abs(turn.effect.yaw_deg - yaw) < 4 * turn.std["yaw_deg"]

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.signal import butter, hilbert, sosfiltfilt
 from scipy.spatial.transform import Rotation
 from second_set_bench import RATE, Multisine, model, samples, times
 
 from frac_accel import Corrector, simulate
 from frac_accel.diagnosis import diagnose
+from frac_accel.model.effects.misalignment import Misalignment
 
 N = 8000
 
@@ -73,3 +75,40 @@ def test_exchanged_axes_are_said_in_words():
     assert "the sensor's y is the reference's minus x" in effect.explanation
     slight = model({"cause": "misalignment", "yaw_deg": 2.0}).axes[0].effects[0]
     assert slight.explanation == type(slight).explanation
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_one_axis_does_not_see_the_others_show(seed):
+    rng = np.random.default_rng([147, seed])
+    axis, truth = int(rng.integers(3)), Rotation.random(random_state=seed)
+    about = Rotation.from_rotvec(rng.uniform(-3, 3) * np.eye(3)[axis])
+    started = Misalignment.of_turn((truth * about).inv().as_matrix())
+    shares = rng.uniform(0.5, 2) * truth.inv().as_matrix()
+    effect = started.with_other_axes(axis, shares)
+    np.testing.assert_allclose(effect.rotation, truth.as_matrix(), atol=2e-3)
+    np.testing.assert_allclose(effect.share_of_axes(axis), started.share_of_axes(axis), atol=1e-12)
+    shares[(axis + 1) % 3] = np.nan  # not measured
+    assert started.with_other_axes(axis, shares) is started
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_turn_beside_a_delay_is_that_of_all_axes(seed):
+    """The turn about the axis itself was what the delay makes of axes that move together, 10
+    degrees; the angles beside it were off by it, and the model turned the other axes by it."""
+    rng, fine, count = np.random.default_rng([148, seed]), 8, 6000
+    motion = sosfiltfilt(butter(2, [0.02, 0.2], "band", fs=fine, output="sos"),
+                         rng.normal(size=(fine * count + 2 * fine, 3)), axis=0)
+    # two axes swing together, as a body that pitches does
+    motion[:, 1] += 0.7 * hilbert(motion[:, 0]).imag
+    motion[:, 2] -= 0.5 * hilbert(motion[:, 0]).imag
+    motion /= motion.std(axis=0)
+    angles = rng.uniform(1.5, 4.0, 3) * rng.choice([-1, 1], 3)
+    late = int(rng.integers(2, 5))
+    reference = motion[fine:][:fine * count:fine]
+    values = turned(motion[fine - late:][:fine * count:fine], *angles)
+    values = values + 0.02 * rng.normal(size=values.shape)
+    t = np.arange(count) / RATE
+    diagnosis = diagnose((samples(t, reference), samples(t, values)), axis="xyz"[seed % 3])
+    effect, = (f.effect for f in diagnosis.findings if f.cause == "misalignment")
+    np.testing.assert_allclose([effect.roll_deg, effect.pitch_deg, effect.yaw_deg], angles,
+                               atol=0.15)

@@ -201,6 +201,20 @@ class Effect:
         """
         return None
 
+    def with_other_axes(self, axis, shares):
+        """This effect with what it says of the other axes as these show it, the same for the axis
+        by which it was found.
+
+        Parameters
+        ----------
+        axis : int
+            By which it was found.
+        shares : ndarray, shape (3, 3)
+            Row i: shares of the axes' simulated outputs in the measured axis i, NaN where either
+            does not move.
+        """
+        return self
+
     @classmethod
     def of_slips(cls, at_s, counts, interval_s, samples):
         """The effect that says that samples are lost though the stamps count on, or None.

@@ -8,7 +8,7 @@ from ..parameters import parameter
 from .axis_mixing import mix, mixing_matrix
 from .axis_turn import turn_of
 from .base import CROSS_AXIS, Effect
-from .fit_starts import finite
+from .fit_starts import Start, finite
 
 _AXES = "xyz"
 # Share of an axis that counts as the whole, for words.
@@ -17,6 +17,10 @@ _WHOLE = 0.97
 # do: less than rounding, and a tenth.
 _SAME_AXIS = 1e-6
 _NEARLY_SAME_AXIS = 0.1
+# Turn [degree] by which a small one is told, and up to which one is small.
+_SMALL_DEG, _LARGE_DEG = 0.1, 20.0
+# Least turn [degree] about an axis that the others show.
+_SEEN_DEG = 0.05
 # Standard uncertainty [degree] of an angle of which nothing is known.
 _ANY_ANGLE_DEG = 360 / np.sqrt(12)
 
@@ -88,6 +92,21 @@ class Misalignment(Effect):
     def share_of_axes(self, axis):
         return self.rotation[:, axis]
 
+    def with_other_axes(self, axis, shares):
+        """The same turn but for one about the axis itself, which only the others see."""
+        others = [(axis + 1) % 3, (axis + 2) % 3]
+        if not np.isfinite(shares[others]).all():
+            return self
+        rotation = self.rotation
+        first, second = rotation[:, others].T
+        about = np.arctan2(shares[others[0]] @ second - shares[others[1]] @ first,
+                           shares[others[0]] @ first + shares[others[1]] @ second)
+        if abs(about) < np.radians(_SEEN_DEG):
+            return self
+        rotation[:, others] = np.stack([np.cos(about) * first + np.sin(about) * second,
+                                        np.cos(about) * second - np.sin(about) * first], axis=1)
+        return Misalignment.of_turn(rotation.T)
+
     def in_words(self, axis):
         """What has become of an axis (0, 1, 2) where it is another one, or turned over; or None."""
         shares = self.share_of_axes(axis)
@@ -119,7 +138,12 @@ class Misalignment(Effect):
     @classmethod
     def starts(cls, view):
         turn = turn_of(view)
-        return [] if turn is None else [finite(cls(*turn))]
+        if turn is None:
+            return []
+        # a small one as the axis itself shows it: by the others it is bent by what only they have
+        angles = cls.fitted_parameters(view.axis, view.excited)
+        small = [Start(cls(*turn), tuple(cls(**{angle: _SMALL_DEG}) for angle in angles), "free")]
+        return [finite(cls(*turn)), *(small if max(map(abs, turn)) < _LARGE_DEG else [])]
 
 
 # The angle that mixes two axes where it is small.
