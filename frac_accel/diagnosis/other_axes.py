@@ -92,10 +92,12 @@ def as_they_show(engine, fitted):
     """A fit whose effects say of the other axes what these show beside all that was found.
 
     A search begins with what they show beside less: a delay between two axes looks like a turn.
+    What the model in use says of them stays.
     """
     p = engine.problem
     shares, _ = p.mixing(fitted.effects)
-    effects = {cause: effect.with_other_axes(p.axis, shares)
+    effects = {cause: effect if cause in engine.search.base
+               else effect.with_other_axes(p.axis, shares)
                for cause, effect in fitted.effects.items()}
     return fitted if effects == fitted.effects else engine.search.again(effects)
 

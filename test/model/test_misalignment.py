@@ -112,3 +112,14 @@ def test_a_turn_beside_a_delay_is_that_of_all_axes(seed):
     effect, = (f.effect for f in diagnosis.findings if f.cause == "misalignment")
     np.testing.assert_allclose([effect.roll_deg, effect.pitch_deg, effect.yaw_deg], angles,
                                atol=0.15)
+
+
+def test_a_stated_turn_stays_as_it_is_stated():
+    """x does not see a roll: what the other axes show of it is no matter of a diagnosis of x."""
+    rng, t, reference, output = motion(4)
+    values = turned(output, 25.0, 0.0, 3.0) + 0.01 * rng.normal(size=(N, 3))
+    stated = {"cause": "misalignment", "roll_deg": 10.0, "pitch_deg": 0.0, "yaw_deg": 3.0}
+    diagnosis = diagnose((samples(t, reference), samples(t, values)), model(stated))
+    effect, = (e for e in diagnosis.model.axis("x").effects if e.cause == "misalignment")
+    assert effect.roll_deg == 10.0
+    assert not diagnosis.findings
