@@ -131,23 +131,22 @@ def _stays(engine, best, fitted, cause):
         for unknown in best.unknowns if unknown.cause == cause)
 
 
-def _with_level(engine, best, named):
-    """A fit with a level, where a named cause changes the zero, which begins anywhere, or brings a
-    constant of other axes, such as gravity, which a zero may do as well."""
-    level, used = IDENTIFIED["offset"](0.0), engine.problem.used
-    if level.cause in best.effects:
+def _with_zero(engine, best, named):
+    """A fit with a zero of its own, where a named cause says of one what another may do."""
+    zero = IDENTIFIED["offset"](0.0)
+    if zero.cause in best.effects or not any(_says_a_zero(engine, best, c) for c in named):
         return best
-    for cause in named:
-        effect = best.effects[cause]
-        if effect.stage == CROSS_AXIS:
-            brought = engine.added(best, cause)
-            if abs(brought[used].mean()) < _BROUGHT * engine.rms(brought):
-                continue
-        elif effect.everyday or not effect.adds:
-            continue
-        return engine.search.to_its_best(
-            engine.search.fit({level.cause: level, **best.effects}))
-    return best
+    return engine.search.to_its_best(engine.search.fit({zero.cause: zero, **best.effects}))
+
+
+def _says_a_zero(engine, best, cause):
+    """Whether a cause changes the zero, which begins anywhere, or brings a constant of other axes,
+    such as gravity, which a zero may do as well."""
+    effect = best.effects[cause]
+    if effect.stage != CROSS_AXIS:
+        return bool(effect.adds) and not effect.everyday
+    brought = engine.added(best, cause)
+    return abs(brought[engine.problem.used].mean()) >= _BROUGHT * engine.rms(brought)
 
 
 def refitted(engine, best, named, tied):
@@ -159,7 +158,7 @@ def refitted(engine, best, named, tied):
     be bent. What is minor beside them stays in the model where all is said with it.
     """
     base, named, dropped = engine.search.base.keys(), named & best.effects.keys(), {}
-    fitted = best = _with_level(engine, best, named)
+    fitted = best = _with_zero(engine, best, named)
     stds = known = engine.uncertainties(best)
     constant = constants_of(best.effects) - base
     missing = best.causes - base - named - constant

@@ -140,10 +140,13 @@ class Misalignment(Effect):
         turn = turn_of(view)
         if turn is None:
             return []
-        # a small one as the axis itself shows it: by the others it is bent by what only they have
-        angles = cls.fitted_parameters(view.axis, view.excited)
-        small = [Start(cls(*turn), tuple(cls(**{angle: _SMALL_DEG}) for angle in angles), "free")]
-        return [finite(cls(*turn)), *(small if max(map(abs, turn)) < _LARGE_DEG else [])]
+        starts = [finite(cls(*turn))]
+        if max(map(abs, turn)) < _LARGE_DEG:
+            # as the axis itself shows it: by the others it is bent by what only they have
+            angles = cls.fitted_parameters(view.axis, view.excited)
+            starts.append(Start(
+                cls(*turn), tuple(cls(**{angle: _SMALL_DEG}) for angle in angles), "free"))
+        return starts
 
 
 # The angle that mixes two axes where it is small.
