@@ -85,8 +85,9 @@ _TAKEN_BACK = 3.0
 _NO_PEAK, _FAR_LATER = 0.8, 10.0
 # Constant of the simulated output, over an offset, from which a gain at standstill may make it.
 _OF_CONSTANT = 0.3
-# Share of that constant up to which an offset has left nothing of it.
-_CANCELLED = 0.02
+# Share of that constant up to which an offset has left nothing of it, and times what such a filter
+# takes of the motion that it may add to the constant: only a coupling that takes it away does more.
+_CANCELLED, _ADDS = 0.02, 10.0
 # Share of the output (RMS) from which a force is strong.
 _STRONG = 0.3
 # Share of the highest frequency that is compared from which a peak lies at its end.
@@ -406,7 +407,9 @@ def _at_standstill(engine, best, takes):
                             "away, does the same")
             continue
         share = _linear_share(engine, best)
-        if share >= _MOSTLY and abs(constant) > _OF_CONSTANT * abs(added):
+        taken = math.sqrt(share) * engine.rms(best.residual) / np.std(best.output[p.used])
+        if share >= _MOSTLY and abs(constant) > _OF_CONSTANT * abs(added) \
+                and added / constant < _ADDS * taken:
             found[cause] = (f"a linear filter would take {share:.0%} of what is left, and its gain "
                             f"at standstill may make the {added:.3g} of the {constant:.3g} there")
     return found

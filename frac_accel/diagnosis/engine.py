@@ -687,8 +687,9 @@ class Engine:
         for order in (np.arange(len(added)), np.argsort(np.abs(best.simulated))):
             total = np.cumsum(energy[order])
             part = np.minimum((total / total[-1] * _PARTS).astype(int), _PARTS - 1)
-            strengths = (np.bincount(part, shared[order], _PARTS)
-                         / np.maximum(np.bincount(part, energy[order], _PARTS), 1e-300))
+            held = np.bincount(part, energy[order], _PARTS)
+            # one strong sample may hold more than a part's share: then a part has none
+            strengths = np.bincount(part, shared[order], _PARTS)[held > 0] / held[held > 0]
             worst = max(worst, float(np.max(np.abs(strengths - 1))))
         return worst
 

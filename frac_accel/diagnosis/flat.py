@@ -25,8 +25,9 @@ _OVERDAMPED = 1.0
 # bends itself.
 _SURELY_LESS, _NEARLY_AS_GOOD = 0.005, 1.02
 # Share by which an oscillator's lead may differ from that of a mount's spring, and factor by which
-# the gain with a mount may then leave more power.
+# the gain with a mount may then leave more power; and from its faster lag, and factor of one lag.
 _AS_A_MOUNT, _OF_A_MOUNT = 0.1, 1.1
+_AS_ITS_LAG, _OF_ONE_LAG = 0.2, 2.0
 # Standard uncertainties by which both must differ for a parameter to be as open as that.
 _OPEN_FROM = 2.0
 # Times what the diagnosis leaves in the end (RMS) up to which a rival describes as much.
@@ -91,9 +92,7 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
                     limit=limit)
     fits = _with_a_link(engine, engine.search.fit({**engine.search.base, **beside}))
     # as well with fewer parameters is better: what one more must gain, it must gain here, too
-    as_well = before.cost + own.threshold(before)
-    if _leads_as_a_mount(own, before):
-        as_well = max(as_well, _OF_A_MOUNT * before.cost)
+    as_well = max(before.cost + own.threshold(before), _by_its_lead(own, before) * before.cost)
     # without a resonance two lags are no oscillator: what else says as much is as likely
     enough = _FAR_LESS if model.axes[column].core.damping_ratio < _OVERDAMPED else 1.0
     found = next((fit for fit in fits if fit.cost <= enough * before.cost
@@ -107,14 +106,23 @@ def flat_instead(record, column, used, model, opened, seed, limit=None):
                   if cause not in engine.search.base}, None
 
 
-def _leads_as_a_mount(engine, fitted):
-    """Whether an oscillator is ahead by what the damping of a mount's spring makes, 2 zeta / omega,
-    which no sensor is by itself."""
+def _by_its_lead(engine, fitted):
+    """Factor by which a gain with one link may leave more power than an oscillator whose lead says
+    that it is one: no sensor is ahead of its motion by itself.
+
+    The damping of a mount's spring makes a lead of 2 zeta / omega; and a lead that undoes the
+    faster of two lags, 1 / (omega (zeta + sqrt(zeta^2 - 1))), leaves one.
+    """
     model = engine.problem.axis_model(fitted.effects)
     core = model.effective_core
+    omega, damping = 2 * np.pi * core.natural_frequency_hz, core.damping_ratio
     lead_s = -sum(effect.pure_delay_s() for effect in model.effects)
-    of_mount_s = core.damping_ratio / (np.pi * core.natural_frequency_hz)
-    return abs(lead_s - of_mount_s) < _AS_A_MOUNT * of_mount_s
+    of_mount_s = 2 * damping / omega
+    if abs(lead_s - of_mount_s) < _AS_A_MOUNT * of_mount_s:
+        return _OF_A_MOUNT
+    faster_s = 1 / (omega * (damping + np.sqrt(max(damping**2 - 1, 0.0))))
+    undone = damping > _OVERDAMPED and abs(lead_s - faster_s) < _AS_ITS_LAG * faster_s
+    return _OF_ONE_LAG if undone else 1.0
 
 
 def _or_with_a_link(own, before, fits):

@@ -24,6 +24,9 @@ _UNRELATED = 0.15
 _AT_MOST = 0.5
 # Standard deviations by which the motion's rank in bursts may exceed that at any time.
 _DEVIATIONS = 4.0
+# Times the motion's mean power that bursts may meet, and the share of other times in the record at
+# which they would have met as much, below which it has made them.
+_MEETS, _HARDLY = 4.0, 0.02
 # Mean of the error in bursts, over its RMS there, up to which noise has it, too, with the chance
 # that so many bursts have one sign; and up to which it has it where all have.
 _ONE_SIDED, _ONE_SIGN = 0.3, 1e-3
@@ -182,11 +185,19 @@ def _follows(inside, error, output, count):
         size = rankdata(np.abs(values)) / len(values)
         if size[inside].mean() > 0.5 + _DEVIATIONS / np.sqrt(12 * count):
             return True
-        if abs(np.corrcoef(values**2, inside)[0, 1]) > _allowed(stretches):
+        if abs(np.corrcoef(values**2, inside)[0, 1]) > _allowed(stretches) \
+                or _meets_the_motion(inside, values**2):
             return True
         if abs(np.corrcoef(values[inside], error[inside])[0, 1]) > _allowed(samples):
             return True
     return False
+
+
+def _meets_the_motion(inside, power):
+    """Whether bursts meet the motion as they hardly would if the record had begun at another time:
+    a motion that is there for a short time only, such as a jump's, decides that by few of them."""
+    met = np.fft.irfft(np.conj(np.fft.rfft(inside.astype(float))) * np.fft.rfft(power), len(inside))
+    return met[0] > _MEETS * met.mean() and np.mean(met >= met[0]) < _HARDLY
 
 
 def _apart_from_motion(inside, output, length):
