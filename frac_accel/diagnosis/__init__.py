@@ -38,7 +38,7 @@ from .screened import screened
 from .search import is_nonlinear
 from .seen import added, by_sample
 from .spikes import spikes, spikes_words
-from .sprung import beside_spring, is_better, may_hide_one, oscillator_of
+from .sprung import as_the_sensor, beside_spring, is_better, may_hide_one, oscillator_of
 from .stages import CHECKED, IDENTIFIED, JUDGED, Stages
 from .stretches import MOST, Stretches, strongest_part
 from .time_limit import TimeLimit
@@ -318,13 +318,14 @@ def _with_a_spring(begin, engine, best, seed, engine_of, record):
     found = oscillator_of(record, AXES[p.axis], engine.wanted)
     if found is None:
         return begin, engine, best, seed
-    model, own_seed = found
+    model, own_seed, damping = found
     own_begin, other = _with_courses(engine_of(model, dict.fromkeys(_CORE, np.inf), own_seed),
                                      engine, engine.search.courses)
     other.search.candidates = beside_spring(engine, best)
     own_best = other.run(own_seed)
-    if is_better(best, own_best, (other.part or other).noise_only(own_best)):
+    if is_better(engine, best, own_best, (other.part or other).noise_only(own_best)):
         return own_begin, other, own_best, own_seed
+    engine.as_the_sensor = as_the_sensor(engine, best, own_best, damping)
     return begin, engine, best, seed
 
 
@@ -510,7 +511,7 @@ def _beside(begin, engine, hidden):
     other = begin(used=engine.wanted & ~hidden)
     other.at_limit, other.identified, other.found = engine.at_limit, engine.identified, engine.found
     other.spikes, other.aside = engine.spikes, engine.aside
-    other.search.courses = engine.search.courses
+    other.search.courses, other.as_the_sensor = engine.search.courses, engine.as_the_sensor
     return other
 
 

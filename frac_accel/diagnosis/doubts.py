@@ -78,8 +78,9 @@ _ALL_MOTION, _OUT_OF_SIGHT = 0.9999, 1.2
 _NO_LEAD = 0.01
 # Times what several filters leave (RMS) up to which one other filter is as likely.
 _ANOTHER = 1.05
-# Times the delay of a core that was identified which a lead beside it may take back.
-_TAKEN_BACK = 3.0
+# Times the delay of a core that was identified which a lead beside it may take back, and share by
+# which a late reference must differ from one that does just that.
+_TAKEN_BACK, _JUST_BACK = 3.0, 0.1
 # Damping ratio from which a core has no peak, and times its own delay from which another one is
 # none of its kind.
 _NO_PEAK, _FAR_LATER = 0.8, 10.0
@@ -97,6 +98,8 @@ _EDGE = 0.95
 _PEAKED, _AT_PEAK = 0.1, 10.0
 # Times as dense as in the octaves beside its resonance that what is left must be there to be of it.
 _DENSER = 10.0
+# Share of what is left around a mode's resonance without it from which it explains nothing there.
+_NO_LESS = 0.9
 # Damping ratio above which a mode beside the sensor's own hardly rings, and below which a peak is
 # no smooth filter's.
 _RINGS, _CLEAR_PEAK = 0.3, 0.2
@@ -115,7 +118,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
     """Why fitted causes are not named, in words by cause."""
     p = engine.problem
     doubts = dict.fromkeys(engine.uncontested, "the time limit left no time for its rivals")
-    doubts |= left_open(engine, best, stds, gains)
+    doubts |= {**engine.as_the_sensor, **left_open(engine, best, stds, gains)}
     takes = {cause: g.taken for cause, g in gains.items()}
     own, rest = engine.by_reference(best), engine.rms(best.residual)
     added = {cause: engine.added(best, cause) for cause in gains}
@@ -173,6 +176,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **_at_the_edge(engine, best), **_hardly_rings(engine, best),
                          **_out_of_sight(engine, best),
                          **_rings_otherwise(engine, best, takes, noise),
+                         **_nothing_at_its_peak(engine, best),
                          **_corrections(engine, best, takes)}.items():
         doubts.setdefault(cause, words)
     if gains and (left.share > 0 or not engine.is_accounted(best, noise)):
@@ -428,14 +432,19 @@ def _share_at_its_peak(engine, best, effect):
     if not is_link(effect) or not 0 < _damping(effect) <= _PEAKED:
         return None, 0.0
     p = engine.problem
-    frequency = np.fft.rfftfreq(len(p.used), 1 / p.rate)
-    apart = np.log2(np.maximum(frequency, 1e-300) * 2 * np.pi / np.abs(effect.poles()).min())
+    apart = _octaves_from_its_resonance(p, effect)
     power = np.abs(np.fft.rfft(best.residual * p.used))**2
     near = np.abs(apart) < 0.5
     beside = [power[(side * apart > 0.5) & (side * apart < 1.5)] for side in (-1, 1)]
     denser = power[near].mean() / max(part.mean() for part in beside) \
         if near.any() and all(map(len, beside)) else 0.0
     return power[near].sum() / max(power.sum(), 1e-300), denser
+
+
+def _octaves_from_its_resonance(problem, effect):
+    """Of each line of a residual's spectrum."""
+    frequency = np.fft.rfftfreq(len(problem.used), 1 / problem.rate)
+    return np.log2(np.maximum(frequency, 1e-300) * 2 * np.pi / np.abs(effect.poles()).min())
 
 
 def _rings_otherwise(engine, best, takes, noise):
@@ -448,6 +457,23 @@ def _rings_otherwise(engine, best, takes, noise):
                 and taken < _AT_PEAK * math.sqrt(share) * rest:
             found[cause] = f"{share:.0%} of what is left lies at its resonance ({rest:.3g} RMS " \
                            f"beside {taken:.3g} that it takes): what rings there is not linear"
+    return found
+
+
+def _nothing_at_its_peak(engine, best):
+    """Modes beside the sensor's own, with an antiresonance, around which as much is left as without
+    them: what they take lies elsewhere, where their share alone shows, as that of many filters."""
+    p, found = engine.problem, {}
+    for cause, effect in _filters(engine, best).items():
+        if not is_link(effect) or not 0 < len(effect.zeros()) == len(effect.poles()) \
+                or not 0 < _damping(effect) <= _RINGS:
+            continue
+        near = np.abs(_octaves_from_its_resonance(p, effect)) < 0.5
+        with_it, without = (float(np.sum(np.abs(np.fft.rfft(fit.residual * p.used)[near])**2))
+                            for fit in (best, engine.best_without(best, cause)))
+        if with_it > _NO_LESS * without:
+            found[cause] = "around its resonance as much is left as without it: what it takes " \
+                           "lies elsewhere, where many filters do the same"
     return found
 
 
@@ -815,11 +841,15 @@ def within_own_delay(engine, best, effect):
     there, 2 zeta / omega_0, is all that tells one from the other well below the resonance. And
     without a peak a core may stand for any low-pass, each of which has a delay of its own.
     """
-    core, delay = engine.problem.axis_model(best.effects).effective_core, effect.pure_delay_s()
-    if not delay or effect.of_reference or not isinstance(core, Oscillator) \
-            or not _core_is_identified(engine):
+    p, delay = engine.problem, effect.pure_delay_s()
+    core = p.axis_model(best.effects).effective_core
+    if not delay or not isinstance(core, Oscillator) or not _core_is_identified(engine):
         return ""
     own = own_delay_s(core)
+    if effect.of_reference:
+        return "" if p.record.is_reference_late or abs(-delay - own) > _JUST_BACK * own else \
+            (f"a lead of {-delay:.3g} s beside a core whose own delay is {own:.3g} s: a filter "
+             "that delays nothing, such as a centred mean, does the same")
     if 0 > delay >= -_TAKEN_BACK * own:
         return (f"a lead of {-delay:.3g} s beside a resonance whose own delay is {own:.3g} s: a "
                 "soft mount resonates alike and does not delay")
@@ -869,7 +899,7 @@ def _acausal(engine, best, stds):
         if leads:
             return dict.fromkeys([*leads, *odd], f"a lead of {-delay:.3g} s beside another core: "
                                  "no sensor has it; they imitate something else")
-    ahead = {cause: words for cause in own
+    ahead = {cause: words for cause in links
              if (words := within_own_delay(engine, best, best.effects[cause]))}
     if ahead:
         return ahead

@@ -114,6 +114,8 @@ class Engine:
         self.record, self.wanted = record, used
         # common causes by name that were identified with the model in use
         self.identified = {}
+        # why causes have no name that the sensor itself may be, in words by cause
+        self.as_the_sensor = {}
         self.search = Search(self.problem, base, candidates, stages)
         # `Open` by cause: what is known of the parameters that are free in every fit
         self.loose = loose or {}
@@ -646,7 +648,7 @@ class Engine:
         On a coarse lattice the simulated values are put on it too: what rounding does to small
         signals is no other cause's merit.
         """
-        errors, step, less = [], self.coarse_step(best), self._less(best, cause)
+        errors, step, less = [], self.coarse_step(best), self.best_without(best, cause)
         known = self._unmoved(best)
         if known:
             less = self.problem.fit({**less.effects, **{name: best.effects[name]
@@ -707,10 +709,10 @@ class Engine:
 
     def takes(self, best, cause):
         """RMS that a fit of all samples leaves less with a cause than without it."""
-        less = self._less(best, cause)
+        less = self.best_without(best, cause)
         return float(np.sqrt(max(less.cost - best.cost, 0.0) / self.problem.count))
 
-    def _less(self, best, cause):
+    def best_without(self, best, cause):
         """The best that is known of a set without a cause: a trial that was left, since it could
         not win, may lie above what fewer causes do."""
         less = self.search.without(best, cause)

@@ -31,8 +31,8 @@ class InBand:
         """What of an addition shows at the record's instants, shape (n,); parameters as those of
         `simulation.sampled`."""
         if self._fine == 1:
-            return self._filtered(sampled(fine, steps, position), 1)
-        return sampled(self._filtered(fine, steps), steps, position)
+            return self.filtered(sampled(fine, steps, position))
+        return sampled(self.filtered(fine, steps), steps, position)
 
     def behind(self, effect, values, whole, circumstances):
         """Samples behind a law of the output, and those before any filter.
@@ -57,5 +57,6 @@ class InBand:
         change = effect.live(self._fine * self._rate).simulate(fine, circumstances) - fine
         return [values + self.added(change, self._fine), whole + change[::self._fine]]
 
-    def _filtered(self, values, steps):
+    def filtered(self, values, steps=1):
+        """What of values, shape (n,), with as many in each interval, the record's filter leaves."""
         return inner_filter(steps * self._rate, self._band_hz, len(values))(values)

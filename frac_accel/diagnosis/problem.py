@@ -11,7 +11,7 @@ from ..errors import FracAccelError
 from ..identification.response.excitation import strongest_stretch
 from ..model import AXES, AxisModel, is_link
 from ..model.core.static_force import StaticForce
-from ..model.effects.base import CORE, CROSS_AXIS, DEAD_ZONE, GAIN, Effect
+from ..model.effects.base import CORE, CROSS_AXIS, DEAD_ZONE, GAIN, INTERFERENCE, Effect
 from ..model.parameters import Scales, fixed_values, parameter_fields
 from ..signals.kept import kept
 from ..simulation import EDGE, AxisSimulator
@@ -255,6 +255,9 @@ class Problem:
         for effect in model.effects:
             if effect.stage == DEAD_ZONE and len(outputs) > 1:
                 outputs = self.in_band.behind(effect, *outputs, circumstances)
+            elif effect.stage == INTERFERENCE and self.in_band:
+                added = effect.live(self.rate).simulate(outputs[0], circumstances) - outputs[0]
+                outputs = [outputs[0] + (self.in_band.filtered(added) if added.any() else 0.0)]
             elif effect.stage != CROSS_AXIS:
                 outputs = [effect.live(self.rate).simulate(values, circumstances)
                            for values in outputs]

@@ -1,9 +1,14 @@
 """Drives of the rig with unequal rates, losses, scattering stamps and a noisy reference."""
 
+import numpy as np
 import pytest
 from blind.plan import GROUPS, plan
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
 
 import frac_accel
+from frac_accel import Samples, SensorModel
+from frac_accel.model.core import Gain
 
 TRIALS = {trial.name: trial for trial in plan(62, GROUPS)}
 TRIALS["clipped"] = next(trial for trial in plan(61, GROUPS)
@@ -56,3 +61,26 @@ def test_a_filter_that_the_record_does_not_tell_from_others_has_no_name(name, be
     # (0.5 %): rounding of the processor decides
     named = {finding.cause for finding in found.findings}
     assert besides - {"timestamp_jitter"} <= named <= besides and found.suspects
+
+
+@pytest.mark.parametrize("seed", [3451, 3452, 3453])
+def test_a_tone_is_as_strong_as_before_what_filters_both_to_the_slower_band(seed):
+    """Compared up to 40 Hz, of a tone at 37.8 Hz a tenth is left: that was its amplitude."""
+    rng = np.random.default_rng(seed)
+    seconds, finer = 40, 2000.0
+    time = np.arange(seconds * finer) / finer
+    motion = CubicSpline(time, sosfiltfilt(butter(2, [0.5, 20], "band", fs=finer, output="sos"),
+                                           rng.standard_normal(len(time))))
+    own, other = np.arange(0, seconds - 1, 0.01) + rng.uniform(0, 0.01), \
+        np.arange(0, seconds - 1, 0.005)
+    frequency, amplitude = rng.uniform(36.5, 38.0), rng.uniform(0.2, 0.4) * motion(own).std()
+    tone = amplitude * np.sin(2 * np.pi * frequency * own + rng.uniform(0, 6))
+    noise = 0.01 * motion(own).std() * rng.standard_normal(len(own))
+    found = frac_accel.diagnose(tuple(
+        Samples.of(np.round(1e9 * at).astype(np.int64), np.c_[values, 0 * values, 0 * values])
+        for at, values in ((other, motion(other)), (own, motion(own) + tone + noise))),
+        SensorModel(Gain(1.0)))
+    named, = found.findings
+    assert named.cause == "tone_interference"
+    assert abs(named.effect.amplitude - amplitude) < 4 * named.std["amplitude"]
+    assert named.std["amplitude"] < 0.05 * amplitude

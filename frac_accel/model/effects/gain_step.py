@@ -38,4 +38,4 @@ class GainStep(Effect):
     @classmethod
     def starts(cls, view):
         return [finite(cls(at_s, float(np.clip(1 + change, 0.02, 50))))
-                for at_s, change in jumps(view, view.simulated)]
+                for at_s, change in jumps(view, view.simulated - view.offset)]

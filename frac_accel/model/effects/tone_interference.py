@@ -6,7 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import INTERFERENCE, Effect
-from .fit_starts import finite, strongest_line
+from .fit_starts import positive, strongest_line
 
 # A tone that wanders by less than about a third of this share of its frequency is followed.
 _RELATIVE_WIDTH = 3e-4
@@ -44,7 +44,8 @@ class ToneInterference(Effect):
     @classmethod
     def starts(cls, view):
         line = strongest_line(view)
-        return [finite(cls(*line))] if line else []
+        # as strong as it is before what filters the record
+        return [positive(cls(*line), "amplitude")] if line else []
 
     def live(self, sampling_rate_hz):
         """In a stream the phase is not known: it is found."""
