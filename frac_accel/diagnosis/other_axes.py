@@ -2,10 +2,12 @@
 
 import dataclasses
 
+import numpy as np
+
 from ..errors import FracAccelError
 from ..model import AXES, is_link
 from ..model.effects import known_effects
-from ..model.effects.base import CROSS_AXIS
+from ..model.effects.base import CROSS_AXIS, OFFSET
 from .empirical import EmpiricalFit
 from .gain import gain
 
@@ -13,6 +15,9 @@ from .gain import gain
 _FROM_ACROSS = 0.2
 # Share of an axis at which a fit begins.
 _ACROSS = 1e-3
+# Share of another axis that a sensor shows which was mounted by eye (a degree or so), and standard
+# uncertainties from which a zero is more open than its fit alone says.
+_BY_EYE, _MORE_OPEN = 0.02, 2.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,6 +105,36 @@ def as_they_show(engine, fitted):
                else effect.with_other_axes(p.axis, shares)
                for cause, effect in fitted.effects.items()}
     return fitted if effects == fitted.effects else engine.search.again(effects)
+
+
+def with_unknown_turn(engine, fitted, finding):
+    """A finding of a zero, as uncertain as a turn makes it that is in no fit: of a constant of
+    another axis, such as gravity, a turn that hardly shows in the motion brings a zero.
+
+    By one step of least squares beside a gain and a delay, with the other axes' shares as far as
+    the record knows them, and none before that (`_BY_EYE`; C. M. Bishop, *Pattern Recognition and
+    Machine Learning* (2006), 3.3). Either zero may be the sensor's: both ends of a uniform
+    distribution (JCGM 100:2008, 4.3.7).
+    """
+    p, effect = engine.problem, finding.effect
+    others = [p.response(other) for other in range(len(AXES))
+              if other != p.axis and p.record.reference[:, other].any()]
+    if effect.stage != OFFSET or not effect.everyday or not others \
+            or any(each.stage == CROSS_AXIS for each in p.axis_model(fitted.effects).effects):
+        return finding
+    own = fitted.output - fitted.output[p.used].mean()
+    columns = np.stack([np.ones(len(own)), own, np.gradient(own), *others], axis=1)[p.used]
+    rest = fitted.residual[p.used]
+    known = np.r_[np.zeros(3), np.full(len(others), np.mean(rest**2) / _BY_EYE**2)]
+    inverse = np.linalg.pinv(columns.T @ columns + np.diag(known), hermitian=True)
+    away = float((inverse @ (columns.T @ rest))[0])
+    turned = np.hypot(away / np.sqrt(3), np.sqrt(np.mean(rest**2) * inverse[0, 0]))
+    (name, std), = finding.std.items()
+    if turned <= _MORE_OPEN * std:
+        return finding
+    return dataclasses.replace(finding, std={name: float(np.hypot(std, turned))}, evidence=[
+        *finding.evidence, "a turn of the sensor that hardly shows in the motion brings as much of "
+        "what the other axes have all the time, such as gravity: so uncertain is the zero"])
 
 
 def fit_shares(problem, effects, output, rest):

@@ -20,7 +20,7 @@ from .evidence import Evidence
 from .finding import Diagnosis
 from .gain import gain
 from .naming import constants_of, moved, remaining, rms_of, sure, suspect
-from .other_axes import fit_shares
+from .other_axes import fit_shares, with_unknown_turn
 from .own_core import in_own_core
 from .words import (
     AS_NOISE,
@@ -153,8 +153,9 @@ def _named(engine, likely, shown_by, back):
     doubted = {**{cause: back[cause] for cause in sorted(back)}, **near, **other_course}
     suspects = [*likely.suspects, *more,
                 *(suspect({cause}, 0.0, words) for cause, words in doubted.items())]
-    findings = _without_mean_delay(
-        [*findings, *away, *(f for f in drifts if f.cause not in back), *shown_by(fitted)])
+    findings = _without_mean_delay([
+        *(with_unknown_turn(engine, fitted, finding) for finding in findings), *away,
+        *(f for f in drifts if f.cause not in back), *shown_by(fitted)])
     unnamed = sorted(fitted.causes - {f.cause for f in findings} - engine.search.base.keys())
     # what was in doubt in a part of the record, or beside something else, is no suspect any more
     suspects = [each for each in suspects
