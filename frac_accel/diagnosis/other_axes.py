@@ -128,7 +128,7 @@ def with_unknown_turn(engine, fitted, finding):
     known = np.r_[np.zeros(3), np.full(len(others), np.mean(rest**2) / _BY_EYE**2)]
     inverse = np.linalg.pinv(columns.T @ columns + np.diag(known), hermitian=True)
     away = float((inverse @ (columns.T @ rest))[0])
-    turned = np.hypot(away / np.sqrt(3), np.sqrt(np.mean(rest**2) * inverse[0, 0]))
+    turned = np.sqrt(away**2 / 3 + np.mean(rest**2) * max(inverse[0, 0], 0.0))
     (name, std), = finding.std.items()
     if turned <= _MORE_OPEN * std:
         return finding
