@@ -17,10 +17,10 @@ _SEGMENT, _SEGMENTS = 1024, 4
 # Lines of such a segment that are near another one, and next to none and to the Nyquist frequency,
 # where a lag is a slow one.
 _NEAR_LINES, _SLOW_LINES = 20, 8
-# Power of the beat's line over the median of all, and of those near it: where both signals end at
-# a frequency, most lines are empty. What is in the motion makes lines of its own: shares that the
-# slope or its square may have there of all its power, or else of that near it.
-_STANDS_OUT, _IN_MOTION, _LINE_OF_MOTION = 4.5, 0.05, 0.4
+# Power of the beat's line over the median of all, and of those up to twice where the slope has this
+# share of its power: beyond, most are empty. What is in the motion makes lines of its own: shares
+# that the slope or its square may have there of all its power, or else of that near it.
+_STANDS_OUT, _ALL, _IN_MOTION, _LINE_OF_MOTION = 4.5, 0.999, 0.05, 0.4
 # Standard deviations of a sawtooth's harmonics from none, their size over that of the sawtooth with
 # the same first one, which is less behind a filter, and the power that the second one may have out
 # of its phase, over that in it.
@@ -31,8 +31,6 @@ _SHARE, _BETTER, _ALIKE = 0.05, 3.0, 0.25
 # Share of a beat whose phase wanders that adds up at one frequency, below which it must make a
 # larger share of the error: two clocks hardly wander, and a phase that is followed follows chance.
 _ADDS_UP, _WANDERING = 0.9, 0.15
-# Stretches whose errors count as independent.
-_STRETCHES = 64
 # Times that the time is halved within which the beat is followed.
 _HALVINGS = 5
 # Phases that the beat is divided into, and the share of them around the jump that is left out.
@@ -190,8 +188,9 @@ def _line(shared, slope, size):
               for values in (shared, slope, slope**2)]
     inner = slice(_SLOW_LINES, -_SLOW_LINES)
     line = _SLOW_LINES + int(np.argmax(powers[0][inner]))
-    near = powers[0][max(line - _NEAR_LINES, _SLOW_LINES):line + _NEAR_LINES + 1]
-    if powers[0][line] < _STANDS_OUT * max(np.median(powers[0][inner]), np.median(near)) \
+    ends = int(np.searchsorted(np.cumsum(powers[1]), _ALL * powers[1].sum()))
+    held = powers[0][_SLOW_LINES:max(2 * ends, line) + 1]
+    if powers[0][line] < _STANDS_OUT * max(np.median(powers[0][inner]), np.median(held)) \
             or any(_has_line(power, line) for power in powers[1:]):
         return None
     return line
@@ -245,7 +244,6 @@ def _stands_out(error, slope, phase):
     these leave.
     """
     found = []
-    starts = np.arange(_STRETCHES) * len(error) // _STRETCHES
     # out of phase with the second harmonic of a sawtooth, whether that rises or falls
     lower = np.stack([np.sin(phase), np.cos(phase), np.cos(2 * phase)], axis=1)
     for rising in (True, False):
@@ -254,8 +252,7 @@ def _stands_out(error, slope, phase):
         columns = slope[:, None] * np.column_stack([lower, higher])
         inverse = np.linalg.pinv(columns.T @ columns, hermitian=True)
         sizes = inverse @ (columns.T @ error)
-        # of stretches, in which errors may go on as they are
-        scores = np.add.reduceat(columns * (error - columns @ sizes)[:, None], starts)
+        scores = columns * (error - columns @ sizes)[:, None]
         std = np.sqrt(np.diag(inverse @ (scores.T @ scores) @ inverse))[3]
         first, own = np.pi * np.hypot(*sizes[:2]), sizes[3] if rising else -sizes[3]
         is_like = _HARMONIC[0] < own / max(first, 1e-300) < _HARMONIC[1] \
