@@ -9,6 +9,7 @@ from ..model import SensorModel
 from ..model.core import Gain
 from ..model.effects import Effect, fault_of_reference, known_effects
 from ..model.parameters import parameter_fields
+from .doubts import own_delay_s
 from .engine import LONG, Engine
 from .gain import gain
 from .off_clock import is_clock
@@ -117,7 +118,7 @@ def _by_its_lead(engine, fitted):
     core = model.effective_core
     omega, damping = 2 * np.pi * core.natural_frequency_hz, core.damping_ratio
     lead_s = -sum(effect.pure_delay_s() for effect in model.effects)
-    of_mount_s = 2 * damping / omega
+    of_mount_s = own_delay_s(core)
     if abs(lead_s - of_mount_s) < _AS_A_MOUNT * of_mount_s:
         return _OF_A_MOUNT
     faster_s = 1 / (omega * (damping + np.sqrt(max(damping**2 - 1, 0.0))))

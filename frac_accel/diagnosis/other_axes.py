@@ -117,10 +117,12 @@ def with_unknown_turn(engine, fitted, finding):
     distribution (JCGM 100:2008, 4.3.7).
     """
     p, effect = engine.problem, finding.effect
+    if effect.stage != OFFSET or not effect.everyday \
+            or any(each.stage == CROSS_AXIS for each in p.axis_model(fitted.effects).effects):
+        return finding
     others = [p.response(other) for other in range(len(AXES))
               if other != p.axis and p.record.reference[:, other].any()]
-    if effect.stage != OFFSET or not effect.everyday or not others \
-            or any(each.stage == CROSS_AXIS for each in p.axis_model(fitted.effects).effects):
+    if not others:
         return finding
     own = fitted.output - fitted.output[p.used].mean()
     columns = np.stack([np.ones(len(own)), own, np.gradient(own), *others], axis=1)[p.used]
