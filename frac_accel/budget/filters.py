@@ -1,10 +1,13 @@
 """Filters of several inputs, fitted to a residual by least squares and judged by other blocks."""
 
+from itertools import groupby
+
 import numpy as np
-from scipy.fft import rfft
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.interpolate import CubicSpline
-from scipy.linalg import cho_factor, cho_solve
-from scipy.signal import fftconvolve, oaconvolve
+from scipy.linalg.lapack import dposv
+from scipy.signal import oaconvolve
 
 from .blocks import FOLDS
 
@@ -73,13 +76,14 @@ class Filters:
     def __init__(self, inputs, lags, blocks, used, step=1):
         self._step, self._all = step, used
         self._lags = lags
-        self._outputs = [values[::step] for values in inputs]
+        self._outputs = _groups(lags, [values[::step] for values in inputs])
         if step > 1:
             blocks = blocks.thinned(step)
             inputs = [_thinned(values, step) for values in inputs]
             used = used[::step]
         self._blocks, self._used = blocks, used
-        self._inputs = inputs
+        # what the weights are applied to is not smoothed
+        self._inputs = self._outputs if step == 1 else _groups(lags, inputs)
         self._guard = max(high - low for low, high in lags)
         self.size = sum(high - low + 1 for low, high in lags)
         # what lies before the record and after it is not known
@@ -128,7 +132,7 @@ class Filters:
         judged, whole = self._products_with(values)
         _, ridge, gained = self._best_weights(self._whole, self._unseen, whole, judged)
         power = sum(np.sum(values[start:stop]**2) for start, stop in self._runs)
-        return solve(self._whole, whole, ridge), 1 - gained / max(power, 1e-300)
+        return Normal(self._whole, whole).solve(ridge), 1 - gained / max(power, 1e-300)
 
     def passed(self, target, others):
         """Other signals through the filter of the first input that fits a target best.
@@ -145,12 +149,13 @@ class Filters:
         step, span = self._step, self._lags[0]
         values = np.where(self._all, target, 0.0)
         values = _thinned(values, step) if step > 1 else values
-        right = sum(self._right(values, *run) for run in self._learnt)
-        taps = solve(self._whole, right, _NO_NOISE)[:span[1] - span[0] + 1]
+        right = self._rights(values, self._learnt).sum(axis=0)
+        taps = Normal(self._whole, right).solve(_NO_NOISE)[:span[1] - span[0] + 1]
         result = []
         for other in others:
             other = _thinned(other, step) if step > 1 else other
-            run = self._run(other, -span[1], len(other) - span[0])
+            before, after = max(span[1], 0), max(-span[0], 0)
+            run = np.pad(other, (before, after))[before - span[1]:][:len(other) + len(taps) - 1]
             through = oaconvolve(run, taps, "valid")
             result.append(_thickened(through, step, len(target)) if step > 1 else through)
         return result
@@ -178,19 +183,18 @@ class Filters:
 
     def _products_with(self, values):
         """Products of the inputs with a target: by the folds that judge them, and of all."""
-        judged = np.zeros((FOLDS, self.size))
-        for block, run in enumerate(self._runs):
-            judged[block % FOLDS] += self._right(values, *run)
+        rights = self._rights(values, self._runs)
+        judged = np.array([rights[fold::FOLDS].sum(axis=0) for fold in range(FOLDS)])
         return judged, judged.sum(axis=0) if self._learnt is self._runs \
-            else self._right(values, *self._learnt[0])
+            else self._rights(values, self._learnt)[0]
 
     def _best_weights(self, gram, unseen, whole, judged):
         """Weights of each fold, by the ridge that takes most from what they have not seen; that
         ridge, and what is taken."""
         best, chosen, most = None, _RIDGES[0], -np.inf
+        normal = [Normal(gram - other, whole - right) for other, right in zip(unseen, judged)]
         for ridge in _RIDGES:
-            weights = [solve(gram - other, whole - right, ridge)
-                       for other, right in zip(unseen, judged)]
+            weights = [equations.solve(ridge) for equations in normal]
             gain = sum(2 * w @ right - w @ other @ w
                        for w, right, other in zip(weights, judged, unseen))
             if gain <= most:
@@ -200,9 +204,17 @@ class Filters:
 
     def _held_out(self, weights):
         """Each block's output of the filter that the others give."""
-        result = np.empty(self._blocks.n)
-        for block, start, stop in self._blocks:
-            result[start:stop] = self._output(weights[block % FOLDS], start, stop)
+        result = np.zeros(self._blocks.n)
+        edges = self._blocks.edges
+        for rows, length in _alike(edges[:-1], edges[1:]):
+            starts, stops = edges[:-1][rows], edges[1:][rows]
+            total = np.zeros((len(rows), length))
+            for span, inputs, columns in self._outputs:
+                taps = np.array([weights[block % FOLDS][columns] for block in rows])
+                _add_output(total, taps.reshape(len(rows), len(inputs), -1),
+                            _moving(inputs, span, starts, length))
+            for values, start, stop in zip(total, starts, stops):
+                result[start:stop] = values[:stop - start]
         return result
 
     def _grams(self, runs, folds):
@@ -221,65 +233,59 @@ class Filters:
     def _products(self, starts, stops):
         """Products of all shifted inputs over the samples of each run that count, shape (runs,
         size, size)."""
-        ends = np.cumsum([0] + [high - low + 1 for low, high in self._lags])
         grams = np.empty((len(starts), self.size, self.size))
-        inputs = [*zip(self._inputs, self._lags, map(slice, ends[:-1], ends[1:]))]
-        for place, (a, span, rows) in enumerate(inputs):
-            for b, other, columns in inputs[place:]:
-                part = grams[:, rows, columns]
-                self._fill_pair(part, a, b, span, other, starts, stops)
-                if columns != rows:
-                    grams[:, columns, rows] = part.transpose(0, 2, 1)
+        groups = self._inputs
+        for rows, length in _alike(starts, stops):
+            own = starts[rows], stops[rows]
+            fixed = [_fixed(inputs, span[0], *own, length) for span, inputs, _ in groups]
+            moving = [_moving(inputs, span, own[0], length) for span, inputs, _ in groups]
+            for i, one in enumerate(groups):
+                for j, other in enumerate(groups[i:], start=i):
+                    part = self._filled(one, other, _sums(fixed[i], moving[j]),
+                                        _sums(fixed[j], moving[i]), *own)
+                    grams[rows, one[-1], other[-1]] = part
+                    if j > i:
+                        grams[rows, other[-1], one[-1]] = part.transpose(0, 2, 1)
         for gram, start, stop in zip(grams, starts, stops):
             unused = start + np.flatnonzero(~self._used[start:stop])
             if len(unused):
                 gram -= self._outer(unused)
         return grams
 
-    def _fill_pair(self, part, a, b, span, other, starts, stops):
-        for gram, start, stop in zip(part, starts, stops):
-            gram[0] = self._shifted_sums(a[start - span[0]:stop - span[0]], b, other, start, stop)
-            gram[:, 0] = gram[0] if a is b and span == other else self._shifted_sums(
-                b[start - other[0]:stop - other[0]], a, span, start, stop)
-        (a_in, b_in), (a_out, b_out) = ((self._shifts(a, span, at - 1)[..., None],
-                                         self._shifts(b, other, at - 1)[:, :-1])
+    def _filled(self, one, other, first, column, starts, stops):
+        """Products of two groups of shifted inputs, from those with the first lag of either, shape
+        (runs, size of one, size of the other)."""
+        (span, a, _), (its_span, b, _) = one, other
+        part = np.empty((len(starts), len(a), span[1] - span[0] + 1,
+                         len(b), its_span[1] - its_span[0] + 1))
+        part[:, :, 0] = first
+        part[:, :, :, :, 0] = column.transpose(0, 2, 3, 1)
+        (a_in, b_in), (a_out, b_out) = ((_shifts(a, span, at - 1)[..., None, None],
+                                         _shifts(b, its_span, at - 1)[:, None, :, :-1])
                                         for at in (starts, stops))
-        for row in range(1, part.shape[1]):
-            np.subtract(a_in[:, row - 1] * b_in, a_out[:, row - 1] * b_out, out=part[:, row, 1:])
-            part[:, row, 1:] += part[:, row - 1, :-1]
+        for row in range(1, part.shape[2]):
+            into = part[:, :, row, :, 1:]
+            np.subtract(a_in[:, :, row - 1] * b_in, a_out[:, :, row - 1] * b_out, out=into)
+            into += part[:, :, row - 1, :, :-1]
+        return part.reshape(len(starts), part.shape[1] * part.shape[2], -1)
 
-    def _run(self, values, start, stop):
-        """Input from one sample to another; 0 beyond the record."""
-        before, after = max(-start, 0), max(stop - len(values), 0)
-        run = values[max(start, 0):stop]
-        return np.pad(run, (before, after)) if before or after else run
-
-    def _shifts(self, values, span, at):
-        """Values of an input at some samples, at all lags."""
-        # within the record as far as it is used
-        return np.take(values, at[:, None] - np.arange(span[0], span[1] + 1), mode="clip")
-
-    def _shifted_sums(self, fixed, values, span, start, stop):
-        """Sums of one run times an input at all lags."""
-        moving = self._run(values, start - span[1], stop - span[0])
-        if min(len(fixed), span[1] - span[0]) < _MANY_LAGS:
-            return np.correlate(moving, fixed, "valid")[::-1]
-        return fftconvolve(moving, fixed[::-1], "valid")[::-1]
-
-    def _right(self, target, start, stop):
-        if stop <= start:
-            return np.zeros(self.size)
-        return np.concatenate([
-            self._shifted_sums(target[start:stop], values, span, start, stop)
-            for values, span in zip(self._inputs, self._lags)])
+    def _rights(self, target, runs):
+        """Products of all shifted inputs with a target over each run, shape (runs, size)."""
+        result = np.zeros((len(runs), self.size))
+        starts, stops = np.array(runs).T
+        for rows, length in _alike(starts, stops):
+            fixed = _fixed(target[None], 0, starts[rows], stops[rows], length)
+            for span, inputs, columns in self._inputs:
+                result[rows, columns] = _sums(
+                    fixed, _moving(inputs, span, starts[rows], length)).reshape(len(rows), -1)
+        return result
 
     def _outer(self, rows):
         """Products over single samples."""
         total = np.zeros((self.size, self.size))
         for some in np.array_split(rows, len(rows) // 4096 + 1):
-            matrix = np.concatenate([
-                values[some[:, None] - np.arange(low, high + 1)]
-                for values, (low, high) in zip(self._inputs, self._lags)], axis=1)
+            matrix = np.concatenate([_shifts(inputs, span, some).reshape(len(some), -1)
+                                     for span, inputs, _ in self._inputs], axis=1)
             total += matrix.T @ matrix
         return total
 
@@ -296,15 +302,90 @@ class Filters:
             total = total + self._outer(rows[(rows >= start) & (rows < stop)])
         return total, by_fold
 
-    def _output(self, weights, start, stop):
-        total, first = np.zeros(stop - start), 0
-        for values, (low, high) in zip(self._outputs, self._lags):
-            taps = weights[first:first + high - low + 1]
-            first += len(taps)
-            run = self._run(values, start - high, stop - low)
-            total += (np.convolve(run, taps, "valid") if len(taps) < 64
-                      else oaconvolve(run, taps, "valid"))
-        return total
+
+def _groups(lags, inputs):
+    """Inputs that have the same lags, one after the other: the lags, the inputs, shape (inputs, n),
+    and the slice of their coefficients."""
+    groups, first = [], 0
+    for span, some in groupby(zip(lags, inputs), key=lambda entry: entry[0]):
+        some = [values for _, values in some]
+        values = np.array(some) if some[1:] else some[0][None]
+        last = first + len(values) * (span[1] - span[0] + 1)
+        groups.append((span, values, slice(first, last)))
+        first = last
+    return groups
+
+
+def _alike(starts, stops):
+    """Places of runs whose lengths are alike, as many as there are, and the longest one's."""
+    lengths = np.asarray(stops) - starts
+    classes = np.ceil(2 * np.log2(np.maximum(lengths, 1)))
+    for one in np.unique(classes[lengths > 0]):
+        rows = np.flatnonzero((classes == one) & (lengths > 0))
+        yield rows, int(lengths[rows].max())
+
+
+def _window(inputs, starts, length):
+    """Inputs, shape (inputs, n), from each start on, shape (runs, inputs, length); 0 beyond the
+    record."""
+    before = max(-int(starts.min()), 0)
+    after = max(int(starts.max()) + length - inputs.shape[1], 0)
+    if before or after:
+        inputs = np.pad(inputs, ((0, 0), (before, after)))
+    return sliding_window_view(inputs, length, axis=1)[:, starts + before].transpose(1, 0, 2)
+
+
+def _fixed(inputs, lag, starts, stops, length):
+    """Inputs with one lag over each run, shape (runs, inputs, length); 0 after its end."""
+    run = _window(inputs, starts - lag, length)
+    return run * (np.arange(length) < (stops - starts)[:, None])[:, None]
+
+
+def _moving(inputs, span, starts, length):
+    """Inputs as all lags of a span meet them from each start on, shape (runs, inputs, length and
+    lags)."""
+    return _window(inputs, starts - span[1], length + span[1] - span[0])
+
+
+def _sums(fixed, moving):
+    """Sums of the products of some runs with others, shape (runs, fixed, moving, lags)."""
+    length = fixed.shape[2]
+    lags = moving.shape[2] - length + 1
+    result = np.empty((len(fixed), fixed.shape[1], moving.shape[1], lags))
+    if min(length, lags) < _MANY_LAGS:
+        for lag in range(lags):
+            place = lags - 1 - lag
+            result[..., lag] = fixed @ moving[:, :, place:place + length].transpose(0, 2, 1)
+        return result
+    many = next_fast_len(moving.shape[2], True)
+    one, other = rfft(fixed, many).conj(), rfft(moving, many)
+    for i in range(fixed.shape[1]):
+        for j in range(moving.shape[1]):
+            result[:, i, j] = irfft(one[:, i] * other[:, j], many)[:, lags - 1::-1]
+    return result
+
+
+def _add_output(total, taps, moving):
+    """Add what filters, shape (runs, inputs, lags), make of runs, to totals of shape (runs,
+    length)."""
+    length, lags = total.shape[1], taps.shape[2]
+    if lags < _MANY_LAGS:
+        for lag in range(lags):
+            place = lags - 1 - lag
+            total += (taps[:, None, :, lag] @ moving[:, :, place:place + length])[:, 0]
+        return
+    many = next_fast_len(moving.shape[2], True)
+    for i in range(taps.shape[1]):
+        # what wraps round lies before the first sample of the run
+        total += irfft(rfft(taps[:, i], many) * rfft(moving[:, i], many),
+                       many)[:, lags - 1:lags - 1 + length]
+
+
+def _shifts(inputs, span, at):
+    """Values of inputs, shape (inputs, n), at some samples, shape (samples, inputs, lags)."""
+    # within the record as far as it is used
+    return np.take(inputs, at[:, None] - np.arange(span[0], span[1] + 1), axis=1,
+                   mode="clip").transpose(1, 0, 2)
 
 
 def _thinned(values, step):
@@ -319,22 +400,35 @@ def _thickened(values, step, count):
     return CubicSpline(np.arange(len(values)), values)(np.minimum(place, len(values) - 1))
 
 
-def solve(gram, right, ridge=_RIDGES[0]):
-    """Weights of the least squares, of inputs scaled to the same size."""
-    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
-    there = scale > 1e-12 * max(scale.max(), 1e-300)
-    weights = np.zeros(len(right))
-    if not there.any() or not np.any(right):
-        return weights
-    size = scale[there]
-    scaled = gram[np.ix_(there, there)] / np.outer(size, size)
-    while ridge < 1:
-        scaled[np.diag_indices_from(scaled)] += ridge
-        try:
-            factor = cho_factor(scaled, check_finite=False)
-        except np.linalg.LinAlgError:
+class Normal:
+    """Equations of a least squares, their inputs scaled to the same size.
+
+    Parameters
+    ----------
+    gram : ndarray, shape (size, size)
+    right : ndarray, shape (size,)
+    """
+
+    def __init__(self, gram, right):
+        scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
+        self._there = scale > 1e-12 * max(scale.max(), 1e-300)
+        self._scale = scale[self._there]
+        if not self._there.all():
+            gram, right = gram[np.ix_(self._there, self._there)], right[self._there]
+        self._right = right / self._scale
+        self._gram = gram / self._scale / self._scale[:, None]
+
+    def solve(self, ridge=_RIDGES[0]):
+        """Weights beside a ridge, or the next one with which there are any; 0 without."""
+        weights = np.zeros(len(self._there))
+        if not self._right.any():
+            return weights
+        while ridge < 1:
+            scaled = self._gram.copy()
+            scaled[np.diag_indices_from(scaled)] += ridge
+            _, found, failed = dposv(scaled, self._right, lower=1)
+            if not failed:
+                weights[self._there] = found / self._scale
+                break
             ridge *= 100
-            continue
-        weights[there] = cho_solve(factor, right[there] / size, check_finite=False) / size
-        break
-    return weights
+        return weights

@@ -1,8 +1,9 @@
 """Inputs that remember for longer than a filter of a few lags: integrals of the motion, and its
 level."""
 
+import functools
+
 import numpy as np
-from scipy.fft import dct, idct
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import lfilter
 
@@ -57,9 +58,16 @@ def integrals(x, shortest):
 
 def without_drift(values):
     """Values without their slowest courses: noise sums up to such ones, too."""
-    lines = dct(values, norm="ortho")
-    lines[:_DRIFTS] = 0.0
-    return idct(lines, norm="ortho")
+    courses = _courses(len(values))
+    return values - courses.T @ (courses @ values)
+
+
+@functools.lru_cache(maxsize=2)
+def _courses(n):
+    """The slowest cosines, shape (courses, n), each of power 1 and none a part of another."""
+    place = np.pi / n * (np.arange(n) + 0.5)
+    waves = np.cos(np.arange(min(_DRIFTS, n))[:, None] * place)
+    return waves / np.linalg.norm(waves, axis=1, keepdims=True)
 
 
 def levels(motion, used):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .blocks import FOLDS
-from .filters import solve
+from .filters import Normal
 
 # Stretches of each block in which the course of a weight counts as constant.
 _STRETCHES = 4
@@ -58,7 +58,8 @@ class Modulated:
             gram = (pairs.T @ self._grams[learnt].reshape(len(c), -1)).reshape(
                 count, count, columns, columns).transpose(0, 2, 1, 3)
             size = count * columns
-            weights = solve(gram.reshape(size, size), (c.T @ self._rights[learnt]).ravel())
+            weights = Normal(gram.reshape(size, size),
+                             (c.T @ self._rights[learnt]).ravel()).solve()
             weights = course @ weights.reshape(count, -1)
             for place in np.flatnonzero(judged):
                 start, stop = self._runs[place]

@@ -4,7 +4,7 @@ import dataclasses
 import functools
 
 import numpy as np
-from scipy.fft import dct
+from scipy.fft import dct, next_fast_len
 from scipy.ndimage import uniform_filter1d
 
 from ..budget import Division, established_noise
@@ -445,9 +445,12 @@ class Engine:
 
     @functools.cached_property
     def _division(self):
-        """Of the record, or where it is very long of the part with the strongest motion."""
+        """Of the record, or where it is very long of the part with the strongest motion; of a few
+        samples less where transforms of so many are slow."""
         p = self.problem
-        self._parted = p.strongest(_PARTED)
+        most = min(_PARTED, len(p.record))
+        self._parted = p.strongest(
+            next(count for count in range(most, 0, -1) if next_fast_len(count) == count))
         return Division(p.record.reference[self._parted], p.record.valid[self._parted], p.rate,
                         p.axis, quick=True)
 

@@ -27,12 +27,13 @@ class InBand:
         self._rate, self._band_hz = record.sampling_rate_hz, record.band_hz
         self._fine = _FINE if "sensor" in record.resampled else 1
 
-    def added(self, fine, steps, position=None):
-        """What of an addition shows at the record's instants, shape (n,); parameters as those of
-        `simulation.sampled`."""
+    def added(self, fine, steps, count, late=0.0):
+        """What of an addition shows at the record's instants, shape (count,); parameters as those
+        of `simulation.sampled`."""
         if self._fine == 1:
-            return self.filtered(sampled(fine, steps, position))
-        return sampled(self.filtered(fine, steps), steps, position)
+            return self.filtered(sampled(fine, steps, count, late))
+        fine = fine if late else fine[:steps * count]
+        return sampled(self.filtered(fine, steps), steps, count, late)
 
     def behind(self, effect, values, whole, circumstances):
         """Samples behind a law of the output, and those before any filter.
@@ -55,7 +56,7 @@ class InBand:
             circumstances = type(circumstances)(*(
                 None if each is None else np.repeat(each, self._fine) for each in circumstances))
         change = effect.live(self._fine * self._rate).simulate(fine, circumstances) - fine
-        return [values + self.added(change, self._fine), whole + change[::self._fine]]
+        return [values + self.added(change, self._fine, len(whole)), whole + change[::self._fine]]
 
     def filtered(self, values, steps=1):
         """What of values, shape (n,), with as many in each interval, the record's filter leaves."""

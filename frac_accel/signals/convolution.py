@@ -136,14 +136,49 @@ def at_positions(values, position):
     first = np.clip(np.floor(position).astype(np.int64) - half + 1, 0,
                     len(values) - _LAGRANGE_POINTS)
     place = position - first
-    result = np.zeros(len(position))
+    return sum(weight * values[first + i] for i, weight in enumerate(_lagrange(place)))
+
+
+def every(values, first, step, count):
+    """As `at_positions`, at places that are a whole number of samples apart.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    first : float
+        The first place [samples from the first one].
+    step : int
+        Samples from one to the next.
+    count : int
+        How many there are.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+    """
+    start = int(np.floor(first)) - _LAGRANGE_POINTS // 2 + 1
+    # places with all their neighbours
+    low, high = np.clip([-(start // step), (len(values) - _LAGRANGE_POINTS - start) // step + 1],
+                        0, count)
+    inside = slice(low, max(high, low))
+    place = first + step * np.arange(count)
+    result = np.empty(count)
+    for beyond in (slice(0, inside.start), slice(inside.stop, count)):
+        result[beyond] = at_positions(values, place[beyond])
+    begins, ends = start + step * inside.start, start + step * inside.stop
+    result[inside] = sum(weight * values[begins + i:ends + i:step][:inside.stop - inside.start]
+                         for i, weight in enumerate(_lagrange(first - start)))
+    return result
+
+
+def _lagrange(place):
+    """Weights of neighbours at 0, 1, ..., for the value of their polynomial at a place."""
     for i in range(_LAGRANGE_POINTS):
-        weight = np.ones(len(position))
+        weight = 1.0
         for j in range(_LAGRANGE_POINTS):
             if j != i:
-                weight *= (place - j) / (i - j)
-        result += weight * values[first + i]
-    return result
+                weight = weight * ((place - j) / (i - j))
+        yield weight
 
 
 def _turned(values):

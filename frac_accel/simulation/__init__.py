@@ -12,7 +12,7 @@ from ..model import AXES, SensorModel
 from ..model.core import Arx
 from ..model.effects.base import CORE, GAIN, Circumstances
 from ..record.sources import is_bag
-from ..signals.convolution import Convolution, at_positions, exponentials
+from ..signals.convolution import Convolution, at_positions, every, exponentials
 from ..signals.kept import kept
 from .modes import modes_of
 
@@ -300,8 +300,7 @@ class AxisSimulator:
             wanted = max(wanted, _PATH_STEPS if self._least_steps >= _FEW_STEPS
                          else _FEW_PATH_STEPS)
         steps = int(np.ceil(min(wanted, _MOST_STEPS_PER_SAMPLE)))
-        position = np.arange(self._n) - delay_s * self._rate
-        count = int(max(position[-1], self._n)) + _BEYOND
+        count = int(max(self._n - 1 - delay_s * self._rate, self._n)) + _BEYOND
         self._prepared(delay_s)
         links = (core, *(effect for effect in model.dynamics[1:] if effect.stage < CORE))
         load = self._level * core.sensitivity if force else 0.0
@@ -333,8 +332,7 @@ class AxisSimulator:
         gain = _product([effect for effect in behind if effect.stage >= GAIN], np.array([1j]))
         if start and filtering:
             start *= _static_gain(lambda s: _product(filtering, s))
-        moving = self._shown(moving, steps, steps * position) if delay_s else \
-            self._shown(moving[:steps * self._n], steps, None)
+        moving = self._shown(moving, steps, self._n, steps * self._rate * delay_s)
         return gain[0].real * (moving + start)
 
     def _core_motion(self, links, natural, orders, steps, count):
@@ -377,12 +375,10 @@ class AxisSimulator:
         return self._convolution
 
 
-def sampled(fine, steps, position=None):
-    """Values at n samples, of those at so many steps in each interval, shape (steps n,).
-
-    `position` (n,): where the samples are among them [steps]; default: on each interval's first.
-    """
-    return fine[::steps] if position is None else at_positions(fine, position)
+def sampled(fine, steps, count, late=0.0):
+    """Values at samples, shape (count,), of those at so many steps in each interval; each sample
+    may come `late`, by so many of these steps."""
+    return every(fine, -late, steps, count) if late else fine[:steps * count:steps]
 
 
 def _kept_of_short(store, key, make, values, *arguments):

@@ -202,16 +202,19 @@ def test_nothing_left_and_nothing_moving():
     assert still.share("noise") > 0.95
 
 
-@pytest.mark.parametrize("lags", [[(0, 0)], [(-3, 5)], [(-2, 4), (-1, 1)]])
+@pytest.mark.parametrize("lags", [
+    [(0, 0)], [(-3, 5)], [(-2, 4), (-1, 1)], [(-2, 4), (-2, 4), (0, 0)], [(-40, 70)]])
 def test_filters_are_the_least_squares_of_the_other_blocks(lags, monkeypatch):
     """Against the matrix written out, with missing samples and samples left out, but no ridge."""
     monkeypatch.setattr(filters, "_RIDGES", (1e-12,))
     rng = np.random.default_rng(4)
-    n = 1000
+    edge = max(max(-low, high) for low, high in lags) + 3
+    n = 100 * edge
     inputs = [rng.normal(size=n) for _ in lags]
     target = np.convolve(inputs[0], [0.5, -1.0, 0.3], "same") + 0.1 * rng.normal(size=n)
     used, left_out = rng.random(n) > 0.05, rng.random(n) < 0.02
-    blocks = Blocks.of(rng.normal(size=n))
+    # blocks of unlike lengths
+    blocks = Blocks.of(np.linspace(1, 3, n) * rng.normal(size=n))
     predicted = Filters(inputs, lags, blocks, used).predict(target, left_out)
     columns = np.stack([np.roll(values, k) for values, (low, high) in zip(inputs, lags)
                         for k in range(low, high + 1)], axis=1)
@@ -224,7 +227,8 @@ def test_filters_are_the_least_squares_of_the_other_blocks(lags, monkeypatch):
             learnt[slice(*blocks.guarded(block, guard))] = False
         weights = np.linalg.lstsq(columns[learnt], target[learnt], rcond=None)[0]
         for block in range(fold, len(blocks), FOLDS):
-            rows = np.arange(max(blocks.edges[block], 8), min(blocks.edges[block + 1], n - 8))
+            rows = np.arange(max(blocks.edges[block], edge),
+                             min(blocks.edges[block + 1], n - edge))
             assert np.allclose(predicted[rows], (columns @ weights)[rows], atol=1e-7)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from frac_accel.signals.convolution import Convolution
+from frac_accel.signals.convolution import Convolution, at_positions, every
 
 LATE, PART = 0.37, slice(100_000, 103_000)
 
@@ -36,3 +36,13 @@ def test_what_rings_does_not_come_round(n):
         convolution = Convolution(values, 1.0)
         found = convolution.response(np.exp(-convolution.s * LATE))
         assert np.max(np.abs(found)) < 1.6 * np.max(np.abs(values))
+
+
+def test_values_a_step_apart_are_those_at_their_places():
+    rng = np.random.default_rng(2)
+    for _ in range(100):
+        values = rng.normal(size=rng.integers(8, 400))
+        first, step, count = rng.uniform(-60, 60), int(rng.integers(1, 9)), int(rng.integers(1, 90))
+        place = first + step * np.arange(count)
+        assert every(values, first, step, count) == pytest.approx(
+            at_positions(values, place), abs=1e-9)
