@@ -47,10 +47,11 @@ MANY_DRAWS = """
 SEEDS = """
     diagnosis_across diagnosis_beside_noise diagnosis_between_gaps diagnosis_companions
     diagnosis_courses diagnosis_high_pass diagnosis_in_bands diagnosis_like_axes
-    diagnosis_of_instruments diagnosis_of_its_kind diagnosis_of_joints diagnosis_of_jumps
-    diagnosis_of_machines diagnosis_of_slow_bands diagnosis_one_filter diagnosis_out_of_sight
-    diagnosis_polled diagnosis_scattered_instants diagnosis_settled diagnosis_sprung
-    diagnosis_sticking diagnosis_strong_spring diagnosis_turned diagnosis_under_gravity
+    diagnosis_of_bent_gains diagnosis_of_instruments diagnosis_of_its_kind diagnosis_of_joints
+    diagnosis_of_jumps diagnosis_of_machines diagnosis_of_slow_bands diagnosis_one_filter
+    diagnosis_out_of_sight diagnosis_polled diagnosis_scattered_instants diagnosis_settled
+    diagnosis_sprung diagnosis_sticking diagnosis_strong_spring diagnosis_turned
+    diagnosis_under_gravity
 """.split()
 
 

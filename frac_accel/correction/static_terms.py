@@ -146,8 +146,7 @@ class StaticTermsDesign:
         return StaticTerms(
             force=self._axis.static_force, phases=phases, band=band, is_coupled=self.is_coupled,
             output_noise=_loudest(fine), velocity_noise=_loudest(change),
-            step=2 * np.pi * self._axis.effective_core.natural_frequency_hz
-            / (POINTS * self._rate),
+            step=2 * np.pi * self._axis.static_force.natural_frequency_hz / (POINTS * self._rate),
             own_noise=float(np.sum(own**2)), common_noise=float(np.sum(own * main)))
 
 
@@ -223,7 +222,7 @@ class StaticTermsState:
                                          else np.zeros(len(level))) for part in parts}
         self._z, self._before = np.zeros(len(level)), steady[:, 0].copy()
         # state of each further law, and where and how fast the mass was before
-        natural = 2 * np.pi * terms.force.core.natural_frequency_hz if terms.force.laws else 0.0
+        natural = 2 * np.pi * terms.force.natural_frequency_hz if terms.force.laws else 0.0
         self._laws = [[(natural * elapsed_s if law.timed else 0.0, (start, 0.0))
                        for start in steady[:, 0]] for law in terms.force.laws]
         weight = np.abs(terms.band.taps)

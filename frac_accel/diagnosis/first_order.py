@@ -32,8 +32,7 @@ def force_response(model, effect, motion, sampling_rate_hz, lag_s=0.0):
     ndarray, shape (n,)
     """
     core = model.effective_core
-    force = static_force(effect.add_force(StaticForce(core=core)), motion, sampling_rate_hz,
-                         core.natural_frequency_hz)
+    force = static_force(effect.add_force(StaticForce(core=core)), motion, sampling_rate_hz)
     convolution = Convolution(force - force[0], sampling_rate_hz, abs(model.delay_s - lag_s))
     s = convolution.s
     transfer = -core.transfer_function(s) / core.sensitivity * np.exp(-s * (model.delay_s - lag_s))
@@ -43,9 +42,9 @@ def force_response(model, effect, motion, sampling_rate_hz, lag_s=0.0):
     return convolution.response(transfer)
 
 
-def static_force(force, motion, sampling_rate_hz, natural_frequency_hz):
+def static_force(force, motion, sampling_rate_hz):
     """Force of a spring along a motion, shape (n,)."""
-    step = 2 * np.pi * natural_frequency_hz / sampling_rate_hz
+    step = 2 * np.pi * force.natural_frequency_hz / sampling_rate_hz
     velocity = np.gradient(motion) / step
     total = sum((coefficient * motion**power for power, coefficient in
                  enumerate(force.polynomial, 2)), np.zeros(len(motion)))

@@ -108,35 +108,47 @@ def as_they_show(engine, fitted):
 
 
 def with_unknown_turn(engine, fitted, finding):
-    """A finding of a zero, as uncertain as a turn makes it that is in no fit: of a constant of
-    another axis, such as gravity, a turn that hardly shows in the motion brings a zero.
+    """A finding of a zero, as uncertain as a turn makes it whose constant is in no fit: of what
+    another axis shows all the time, such as gravity, a turn that hardly shows in the motion brings
+    a zero, and so does one that is known where the reference does not show that constant.
 
-    By one step of least squares beside a gain and a delay, with the other axes' shares as far as
-    the record knows them, and none before that (`_BY_EYE`; C. M. Bishop, *Pattern Recognition and
-    Machine Learning* (2006), 3.3). Either zero may be the sensor's: both ends of a uniform
-    distribution (JCGM 100:2008, 4.3.7).
+    Either zero may be the sensor's: both ends of a uniform distribution (JCGM 100:2008, 4.3.7),
+    or that of the known turn.
     """
     p, effect = engine.problem, finding.effect
-    if effect.stage != OFFSET or not effect.everyday \
-            or any(each.stage == CROSS_AXIS for each in p.axis_model(fitted.effects).effects):
-        return finding
-    others = [p.response(other) for other in range(len(AXES))
+    others = [other for other in range(len(AXES))
               if other != p.axis and p.record.reference[:, other].any()]
-    if not others:
+    if effect.stage != OFFSET or not effect.everyday or not others:
         return finding
+    responses = np.stack([p.response(other) for other in others], axis=1)
+    # gravity, where the reference does not show it
+    hidden = np.mean((p.record.sensor[:, others] - responses)[p.used], axis=0)
+    shares = np.zeros(len(AXES))
+    for each in p.axis_model(fitted.effects).effects:
+        if each.stage == CROSS_AXIS:
+            shares += each.share_of_axes(p.axis)
+    turned = np.hypot(_of_a_turn(p, fitted, responses + hidden), shares[others] @ hidden)
+    (name, std), = finding.std.items()
+    words = ["a turn of the sensor brings as much of what the other axes have all the time, such "
+             "as gravity: so uncertain is the zero"] if turned > _MORE_OPEN * std else []
+    return dataclasses.replace(finding, std={name: float(np.hypot(std, turned))},
+                               evidence=[*finding.evidence, *words])
+
+
+def _of_a_turn(problem, fitted, responses):
+    """Standard uncertainty of a zero, of a turn that is in no fit: by one step of least squares
+    beside a gain and a delay, with the other axes' shares as far as the record knows them, and none
+    before that (`_BY_EYE`; C. M. Bishop, *Pattern Recognition and Machine Learning* (2006), 3.3).
+    `responses`, shape (n, axes), are those of the other axes."""
+    p = problem
     own = fitted.output - fitted.output[p.used].mean()
-    columns = np.stack([np.ones(len(own)), own, np.gradient(own), *others], axis=1)[p.used]
+    columns = np.c_[np.ones(len(own)), own, np.gradient(own), responses][p.used]
     rest = fitted.residual[p.used]
-    known = np.r_[np.zeros(3), np.full(len(others), np.mean(rest**2) / _BY_EYE**2)]
+    known = np.r_[np.zeros(3), np.full(responses.shape[1], np.mean(rest**2) / _BY_EYE**2)]
     inverse = np.linalg.pinv(columns.T @ columns + np.diag(known), hermitian=True)
     away = float((inverse @ (columns.T @ rest))[0])
-    turned = np.sqrt(away**2 / 3 + np.mean(rest**2) * max(inverse[0, 0], 0.0))
-    (name, std), = finding.std.items()
-    if turned <= _MORE_OPEN * std:
-        return finding
-    return dataclasses.replace(finding, std={name: float(np.hypot(std, turned))}, evidence=[
-        *finding.evidence, "a turn of the sensor that hardly shows in the motion brings as much of "
-        "what the other axes have all the time, such as gravity: so uncertain is the zero"])
+    # either zero may be the sensor's
+    return np.sqrt(away**2 / 3 + np.mean(rest**2) * max(inverse[0, 0], 0.0))
 
 
 def fit_shares(problem, effects, output, rest):

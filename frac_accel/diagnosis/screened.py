@@ -140,7 +140,7 @@ def _level_before(problem, effects, effect):
                                 if not acts_on_spring(other)})
     core = model.effective_core
     force = static_force(effect.add_force(StaticForce(core=core)), problem.motion(effects),
-                         problem.rate, core.natural_frequency_hz)
+                         problem.rate)
     at_rest = np.array([1e-9 + 0j])
     passed = np.prod([link.transfer_function(at_rest)[0].real for link in model.dynamics[1:]
                       if link.stage > CORE])

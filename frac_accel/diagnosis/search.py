@@ -47,6 +47,8 @@ _LITTLE = 0.25
 _FAR_LESS = 0.5
 # Variances of the noise within which orders and kinds of a cause say the same.
 _TIE = 10.0
+# Share of a cost within which two are the same.
+_ROUNDING = 1e-7
 # Of those that are compared once more, how far one may have strayed that takes another's place [of
 # how far that has].
 _STRAYED = 0.5
@@ -241,11 +243,22 @@ class Search:
             if anew:
                 # what only says the same does not take its place
                 near = [fit, *(other for other in near
-                               if self._strayed(other) <= _STRAYED * self._strayed(fit))]
-            better = min(near, key=lambda other: (self._strayed(other), other.cost))
+                               if self._strayed(other) < _STRAYED * self._strayed(fit)
+                               or self._tied(other.cost) < fit.cost)]
+            better = self._leanest(near)
             if better is fit:
                 return fit
             fit = better
+
+    def _leanest(self, fits):
+        """The best of the fits that have strayed least; of those that are the same but for
+        rounding, the one whose parameters are the smallest."""
+        strayed = min(map(self._strayed, fits))
+        fits = [fit for fit in fits if self._strayed(fit) == strayed]
+        same = (1 + _ROUNDING) * min(fit.cost for fit in fits)
+        return min((fit for fit in fits if fit.cost <= same), key=lambda fit: sum(
+            abs(place) for unknown, place in zip(fit.unknowns, fit.theta)
+            if not unknown.logarithmic))
 
     def _exchanged(self, fit):
         """The better of a fit and the same with two resonances exchanged."""

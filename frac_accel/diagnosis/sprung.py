@@ -67,12 +67,13 @@ def oscillator_of(record, axis, used):
 
 
 def beside_spring(engine, best):
-    """Causes that are tried with the oscillator: those that a gain cannot have, and what was found
-    with it or is common. All else has been tried beside the gain, in vain."""
+    """Causes that are tried with the oscillator: those that a gain cannot have or has without a
+    mass, and what was found with it or is common. All else has been tried beside the gain, in
+    vain."""
     core = engine.problem.baseline.axis(engine.problem.axis).core
     return [cause for cause, effect in known_effects().items()
-            if not effect.read_off and (not effect.acts_on(core) or effect.everyday
-                                        or cause in best.effects)]
+            if not effect.read_off and (not effect.acts_on(core) or effect.bends_at_once
+                                        or effect.everyday or cause in best.effects)]
 
 
 def is_better(engine, best, other, leaves_noise):

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import FracAccelError, ModelError
 from ..io.samples import Samples
 from ..model import AXES, SensorModel
-from ..model.core import Arx
+from ..model.core import Arx, Gain
 from ..model.effects.base import CORE, GAIN, Circumstances
 from ..record.sources import is_bag
 from ..signals.convolution import Convolution, at_positions, every, exponentials
@@ -293,7 +293,9 @@ class AxisSimulator:
             raise FracAccelError(f"a model with a nonlinear spring or friction needs numba to be "
                                  f"simulated: pip install numba ({error})") from None
         core = model.effective_core
-        natural = 2 * np.pi * core.natural_frequency_hz if force else 0.0
+        # the mass of a gain follows its spring at once
+        at_once = isinstance(core, Gain)
+        natural = 2 * np.pi * core.natural_frequency_hz if force and not at_once else 0.0
         highest = natural / (2 * np.pi) * np.sqrt(1 + force.slope)
         wanted = self._least_steps * max(1.0, 3 * highest / self._rate)
         if model.path_dependent:
@@ -304,11 +306,13 @@ class AxisSimulator:
         self._prepared(delay_s)
         links = (core, *(effect for effect in model.dynamics[1:] if effect.stage < CORE))
         load = self._level * core.sensitivity if force else 0.0
-        orders = nonlinear_motion.derivatives_needed(force) + 1 if force else 1
+        orders = nonlinear_motion.derivatives_needed(force) + 1 if natural else 1
         known_by = links, natural, orders, steps, count
         motion, modes = kept(self._motions, known_by, self._core_motion, *known_by, most=1)
         start, deviation = 0.0, np.zeros(motion.shape[1])
-        if force:
+        if force and at_once:
+            deviation = kept(self._deviations, (known_by, force), _bent, force, motion[0], most=3)
+        elif force:
             start = force.equilibrium(load) - load
             deviation = kept(self._deviations, (known_by, force), nonlinear_motion.deviation,
                              modes, force, natural / (self._rate * steps), motion, start,
@@ -379,6 +383,11 @@ def sampled(fine, steps, count, late=0.0):
     """Values at samples, shape (count,), of those at so many steps in each interval; each sample
     may come `late`, by so many of these steps."""
     return every(fine, -late, steps, count) if late else fine[:steps * count:steps]
+
+
+def _bent(force, motion):
+    """What a force adds to a motion that follows at once."""
+    return force.at_once(motion) - motion
 
 
 def _kept_of_short(store, key, make, values, *arguments):

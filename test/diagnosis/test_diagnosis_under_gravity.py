@@ -111,20 +111,25 @@ def test_a_turn_under_gravity_is_known_as_well_as_the_zero_lets_it_be(seed):
     assert abs(turn.effect.yaw_deg - yaw) < 4 * turn.std["yaw_deg"]
 
 
-def test_a_zero_under_gravity_is_known_as_well_as_a_turn_lets_it_be():
+@pytest.mark.parametrize("shown, along", [(True, (-1, 1)), (False, (-1, 1)), (False, (1, 1.5))])
+def test_a_zero_under_gravity_is_known_as_well_as_a_turn_lets_it_be(shown, along):
     """A turn of half a degree that hardly shows, where the other axes hardly move, brings 0.09 m/s²
-    of gravity: the zero's uncertainty was hundreds of times too small, as if there was none."""
+    of gravity: the zero's uncertainty was hundreds of times too small, as if there was none.
+
+    Of a reference that does not show gravity, a turn that is known (as the other axes move `along`,
+    by powers of ten) brings it, too."""
     apart, rate, count = [], 100.0, 6000
     for seed in range(12):
         rng = np.random.default_rng([161, seed])
         motion = sosfiltfilt(butter(2, [0.5, 20], "band", fs=rate, output="sos"),
                              rng.normal(size=(count, 3)), axis=0)
-        reference = motion / motion.std(axis=0) * [2.0, *0.03 * 10**rng.uniform(-1, 1, 2)] \
+        reference = motion / motion.std(axis=0) * [2.0, *0.03 * 10**rng.uniform(*along, 2)] \
             + [0, 0, 9.81]
         turn = Rotation.from_euler("xyz", rng.normal(0, 0.7, 3), degrees=True)
         zero = rng.choice([-1, 1]) * rng.uniform(0.05, 0.3)
         sensor = turn.inv().apply(reference) + [zero, 0, 0] + 0.02 * rng.normal(size=(count, 3))
         stamps = np.round(1e9 * np.arange(count) / rate)
+        reference = reference - [0, 0, 0 if shown else 9.81]
         found = diagnose(tuple(Samples.of(stamps, values) for values in (reference, sensor)),
                          SensorModel(Gain(1.0)))
         apart += [(f.effect.offset - zero) / f.std["offset"] for f in found.findings

@@ -157,8 +157,8 @@ def test_where_the_band_does_not_tell_nothing_else_is_named():
      "order: 1.5 given, expected a whole number"),
     ({"cause": "second_resonance", "frequency_hz": 50, "damping_ratio": 0.1, "share": 1},
      "share: 1 given, expected a number above -1 and below 1"),
-    ({"cause": "cubic_stiffness", "alpha3": 1e-3},
-     "cubic_stiffness given with a core of type gain, expected an oscillator"),
+    ({"cause": "coulomb_friction", "level": 1e-3},
+     "coulomb_friction given with a core of type gain, expected an oscillator"),
 ])
 def test_errors_say_what_was_expected(effect, words):
     with pytest.raises(ModelError, match=words):

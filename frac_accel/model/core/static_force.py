@@ -8,6 +8,9 @@ import numpy as np
 
 from ...errors import FracAccelError
 
+# Points of a spring's characteristic from which Newton's method finds the rest, and its steps.
+_GRID, _NEWTON = 257, 3
+
 
 class ForceLaw(NamedTuple):
     """A further term of the force, with or without a state of its own.
@@ -83,7 +86,7 @@ class StaticForce:
         R. Bouc (1967) and Y.-K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249-263.
     laws : tuple of ForceLaw
         Further terms of :math:`N`.
-    core : Oscillator, optional
+    core : Oscillator or Gain, optional
         What the spring belongs to, for laws that need to know.
     """
 
@@ -99,6 +102,11 @@ class StaticForce:
     def slope(self):
         """Largest slope by q that a law declares."""
         return max((law.slope for law in self.laws), default=0.0)
+
+    @property
+    def natural_frequency_hz(self):
+        """Of the core; without bound where the mass of a gain follows at once."""
+        return getattr(self.core, "natural_frequency_hz", np.inf)
 
     def __bool__(self):
         return bool(any(self.polynomial) or self.friction_level != 0 or self.strength != 0
@@ -134,3 +142,15 @@ class StaticForce:
             raise FracAccelError(f"the model's spring has no position of rest under {load:g} "
                                  "output units: its stiffness terms are too large")
         return float(between[np.argmin(np.abs(between))])
+
+    def at_once(self, load):
+        """`equilibrium` under each of some loads, shape (n,), as a mass that follows at once has
+        it: where a sensor is far below its resonance."""
+        ends = self.equilibrium(float(load.min())), self.equilibrium(float(load.max()))
+        carried = np.polynomial.Polynomial([0.0, 1.0, *self.polynomial])
+        # from end to end the load grows with the output
+        grid = np.linspace(*ends, _GRID)
+        found = np.interp(load, carried(grid), grid)
+        for _ in range(_NEWTON):
+            found = found - (carried(found) - load) / carried.deriv()(found)
+        return found

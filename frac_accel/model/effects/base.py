@@ -19,7 +19,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ...errors import ModelError
-from ..core import Oscillator
+from ..core import Gain, Oscillator
 from ..parameters import is_varied, parameter_fields
 
 # Place in the signal's way through the sensor, from base to record. What happened to the reference
@@ -129,6 +129,8 @@ class Effect:
     restates_core: ClassVar[bool] = False
     # parameters whose null value makes this cause a special case of a simpler one
     nested: ClassVar[tuple[str, ...]] = ()
+    # True for a force that hangs on nothing but where the mass is, so that a gain has it, too
+    bends_at_once: ClassVar[bool] = False
     # True for what grows along a record, so that a part of it may not show it
     shows_with_time: ClassVar[bool] = False
     # True for what counts its time from a record's first sample, so that it is of that record alone
@@ -330,9 +332,10 @@ class Effect:
 
     @classmethod
     def acts_on(cls, core):
-        """Whether a sensor with this core can have this cause: motion and spring need a mass."""
-        return isinstance(core, Oscillator) or (
-            cls.change_core is Effect.change_core and cls.add_force is Effect.add_force)
+        """Whether a sensor with this core can have this cause: motion and spring need a mass, but
+        for a spring that is bent also far below the resonance."""
+        return isinstance(core, Oscillator) or cls.change_core is Effect.change_core and (
+            cls.add_force is Effect.add_force or cls.bends_at_once and isinstance(core, Gain))
 
     def degenerate(self, scales):
         """Why, with these parameters, it is not what its name says, in words; or None.

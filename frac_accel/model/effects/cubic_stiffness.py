@@ -3,7 +3,7 @@
 import dataclasses
 
 from ..parameters import parameter
-from .base import CORE, Effect, require_oscillator
+from .base import CORE, Effect
 from .fit_starts import by_equation, free
 
 
@@ -13,14 +13,12 @@ class CubicStiffness(Effect):
 
     cause = "cubic_stiffness"
     stage = CORE
+    bends_at_once = True
     explanation = "The spring hardens (or softens) at large displacement, the same both ways."
     experiment = ("Repeat at half and at twice the level: the deviation grows with the cube of "
                   "the level.")
 
     alpha3: float = parameter("1/(output units)^2", scale=(0.1, "per_level_squared"), null=0.0)
-
-    def change_core(self, core):
-        return require_oscillator(core, self.cause)
 
     def add_force(self, force):
         return force.with_power(3, self.alpha3)

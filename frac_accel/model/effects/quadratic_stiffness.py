@@ -3,7 +3,7 @@
 import dataclasses
 
 from ..parameters import parameter
-from .base import CORE, Effect, require_oscillator
+from .base import CORE, Effect
 from .fit_starts import by_equation, free
 
 
@@ -13,14 +13,12 @@ class QuadraticStiffness(Effect):
 
     cause = "quadratic_stiffness"
     stage = CORE
+    bends_at_once = True
     explanation = "The spring is harder in one direction than in the other."
     experiment = ("Repeat at half and at twice the level: the deviation grows with the square of "
                   "the level, with a second harmonic and a shift of the mean.")
 
     alpha2: float = parameter("1/(output units)", scale=(0.1, "per_level"), null=0.0)
-
-    def change_core(self, core):
-        return require_oscillator(core, self.cause)
 
     def add_force(self, force):
         return force.with_power(2, self.alpha2)
