@@ -28,7 +28,7 @@ from .courses import begun_with, beside, course_of, is_a_law, is_worth_it, refin
 from .engine import Engine
 from .event import event, start
 from .finding import Diagnosis, Finding, insufficient
-from .flat import flat_instead, with_rival
+from .flat import by_its_lead_a_mount, flat_instead, with_a_mount, with_rival
 from .judgement import judge
 from .leftover import related
 from .off_clock import are_lost, clock_of, put_back, slips_of
@@ -196,6 +196,8 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     begin, engine, best = _searched(begin, engine, seed)
     if not is_stated and may_hide_one(engine, best):
         begin, engine, best, seed = _with_a_spring(begin, engine, best, seed, engine_of, record)
+    elif not is_stated:
+        begin, engine, best, seed = _with_a_mount(begin, engine, best, seed, engine_of)
     begin, engine, best = _with_unlike_axes(begin, engine, best, seed)
     begin, engine, best = _with_a_course(begin, engine, best, seed)
     if engine.part is None:
@@ -327,6 +329,23 @@ def _with_a_spring(begin, engine, best, seed, engine_of, record):
         return own_begin, other, own_best, own_seed
     engine.as_the_sensor = as_the_sensor(engine, best, own_best, damping)
     return begin, engine, best, seed
+
+
+def _with_a_mount(begin, engine, best, seed, engine_of):
+    """Engine with a gain on a mount in the place of the oscillator that was identified, what begins
+    and seeds it, and its best set; those given where that is no mount by its lead. Beside what
+    changes along the record neither was known when the oscillator was."""
+    p = engine.problem
+    cause = by_its_lead_a_mount(engine, best)
+    if cause is None or p.limit.ends_search("no mount was tried in the sensor's place"):
+        return begin, engine, best, seed
+    flat = SensorModel(Gain(p.baseline.axes[p.axis].core.sensitivity))
+    own_begin, other = _with_courses(engine_of(flat, dict.fromkeys(_CORE, np.inf), {}), engine,
+                                     engine.search.courses)
+    own_seed = with_a_mount(other, best, cause)
+    if own_seed is None:
+        return begin, engine, best, seed
+    return own_begin, other, other.run(own_seed), own_seed
 
 
 def _searched(begin, engine, seed):

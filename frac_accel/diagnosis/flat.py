@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..model import SensorModel
-from ..model.core import Gain
+from ..model.core import Gain, Oscillator
 from ..model.effects import Effect, fault_of_reference, known_effects
 from ..model.parameters import parameter_fields
 from .doubts import own_delay_s
@@ -118,12 +118,41 @@ def _by_its_lead(engine, fitted):
     core = model.effective_core
     omega, damping = 2 * np.pi * core.natural_frequency_hz, core.damping_ratio
     lead_s = -sum(effect.pure_delay_s() for effect in model.effects)
-    of_mount_s = own_delay_s(core)
-    if abs(lead_s - of_mount_s) < _AS_A_MOUNT * of_mount_s:
+    if _as_of_a_mount(lead_s, core):
         return _OF_A_MOUNT
     faster_s = 1 / (omega * (damping + np.sqrt(max(damping**2 - 1, 0.0))))
     undone = damping > _OVERDAMPED and abs(lead_s - faster_s) < _AS_ITS_LAG * faster_s
     return _OF_ONE_LAG if undone else 1.0
+
+
+def _as_of_a_mount(lead_s, core):
+    """Whether a lead is that which the damping of a mount's spring makes."""
+    return abs(lead_s - own_delay_s(core)) < _AS_A_MOUNT * own_delay_s(core)
+
+
+def by_its_lead_a_mount(engine, best):
+    """Cause of a set without which its oscillator would be no mount, or None: a zero, and nothing
+    else, where that of a mount lies."""
+    core = engine.problem.axis_model(best.effects).effective_core
+    for cause in best.causes - engine.search.base.keys() if isinstance(core, Oscillator) else ():
+        effect = best.effects[cause]
+        zeros = effect.zeros()
+        if len(zeros) == 1 and zeros[0] and not len(effect.poles()) \
+                and _as_of_a_mount(float(np.real(-1 / zeros[0])), core):
+            return cause
+    return None
+
+
+def with_a_mount(engine, best, cause):
+    """Effects of a gain's `engine` with one link in the place of an oscillator and a cause that is
+    the zero of a mount, beside all else that was found; None where that is not as good, with fewer
+    parameters."""
+    search = engine.search
+    kept = {name: effect for name, effect in best.effects.items()
+            if name in search.candidates and name != cause and not effect.restates_core}
+    fits = _with_a_link(engine, search.fit({**search.base, **kept}))
+    return next((fit.effects for fit in fits if fit.cost <= _OF_A_MOUNT * best.cost
+                 and fit.size < best.size), None)
 
 
 def _or_with_a_link(own, before, fits):

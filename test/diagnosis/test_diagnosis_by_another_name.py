@@ -5,7 +5,7 @@ import pytest
 from exact_sines import samples
 from scipy.signal import bilinear, butter, lfilter, sosfilt
 
-from frac_accel import SensorModel
+from frac_accel import SensorModel, diagnose
 from frac_accel.diagnosis.engine import Engine
 from frac_accel.diagnosis.sprung import as_the_sensor, by_another_name, is_better, may_hide_one
 from frac_accel.model.core import Gain, Oscillator
@@ -49,3 +49,28 @@ def test_a_low_pass_is_one_where_its_damping_is_known(seed):
     assert not is_better(gain, low_pass, oscillator, True)
     assert as_the_sensor(gain, low_pass, oscillator, (0.71, 0.005)) == {}
     assert "may be one" in as_the_sensor(gain, low_pass, oscillator, (0.7, 0.1))["low_pass_filter"]
+
+
+@pytest.mark.parametrize("seed", [3611, 3614])
+def test_a_mount_beside_a_gain_that_drifts_is_no_oscillator_with_a_lead(seed):
+    """Where no core was identified beside the drift, an oscillator and a `reference_low_pass` had
+    the mount's poles and its zero."""
+    rng = np.random.default_rng(seed)
+    rate, count, finer = 50.0, 950, 32
+    fine = rate * finer
+    band = [rng.uniform(0.1, 0.4), rng.uniform(2, 5)]
+    motion = sosfilt(butter(2, band, "band", fs=fine, output="sos"),
+                     rng.standard_normal(count * finer))
+    frequency, damping = rng.uniform(6, 9), rng.uniform(0.1, 0.25)
+    own = 2 * np.pi * frequency
+    sensor = lfilter(*bilinear([2 * damping * own, own**2], [1, 2 * damping * own, own**2], fine),
+                     motion)[::finer]
+    drift = rng.choice([-1, 1]) * rng.uniform(0.25, 0.6)
+    sensor = sensor * (1 + drift * np.arange(count) / count)
+    sensor = sensor + 0.006 * sensor.std() * rng.standard_normal(count)
+    found = {finding.cause: finding for finding in diagnose(
+        samples(motion[::finer], sensor, rate)).findings}
+    assert set(found) == {"mounting_resonance", "gain_drift"}
+    mount = found["mounting_resonance"]
+    assert abs(mount.effect.frequency_hz - frequency) < 4 * mount.std["frequency_hz"]
+    assert abs(mount.effect.damping_ratio - damping) < 4 * mount.std["damping_ratio"]
