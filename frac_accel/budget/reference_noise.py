@@ -34,6 +34,9 @@ _SHARED, _WIDE, _EVEN, _LOUDEST = 0.2, 0.15, 2.0, 2.0
 # filter must leave more, and rounds in which the deviations become known.
 _LINES_SHARED, _COHERENT = 12, 0.3
 _STANDS_OUT, _SCATTER, _NO_FILTER, _PASSES = 12.0, 1.2, 30.0, 4
+# Share of a line that noise must have for the coherence to tell whether it is noise: that would be
+# one less the share, and may be higher by as much as counts as nothing shared.
+_NOISY = 0.2
 # Share of the floor that the median of the segments must have.
 _STEADY = 0.5
 # Relative uncertainty at least: no noise is white to better than that.
@@ -166,8 +169,16 @@ def _estimates(record, column, used, covariance_std, own_rate, most, size, spect
     median = welch(one, rate, nperseg=size, average="median")[1][inner]
     for density, by in ((_floor(*spectra[1:], median), "floor"),
                         (_excess(*spectra, len(one) / size, transfer_function), "excess")):
-        if density is not None:
+        if density is not None and not _is_shared(density, *spectra[1:]):
             yield density, by
+
+
+def _is_shared(density, own, other, shared):
+    """Whether both share more than an even density of the reference's noise would leave: motion,
+    which a low-pass takes from the sensor."""
+    noisy = density > _NOISY * own
+    coherence = shared**2 / np.maximum(own * other, 1e-300)
+    return bool(noisy.any() and np.mean((coherence - 1 + density / own)[noisy]) > _SHARED)
 
 
 def _at_rest(one, two, used, rate):
