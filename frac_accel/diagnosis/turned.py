@@ -46,7 +46,8 @@ def with_turn(judged, engine, orientation):
     g = gain(before[rows], after[rows])
     finding = Finding(
         effect, effect.std_of_turn(orientation.angle_std_deg), certainty(g), [],
-        [orientation.words, *gain_words(effect.cause, g, np.inf, [])], g)
+        [orientation.words, *effect.words_of_turn(orientation.angle_std_deg),
+         *gain_words(effect.cause, g, np.inf, [])], g)
     # the model in use knows nothing of the turn
     spread = float(np.std(published[rows]))
     noise = 0.0 if judged.verdict == "undecided" else judged.baseline["noise_rms"]

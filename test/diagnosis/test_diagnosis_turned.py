@@ -45,7 +45,7 @@ def test_the_written_model_leaves_what_is_claimed(seed, tmp_path):
     # exactly the rotation that the signal was turned by, wherever its angles lie
     assert np.degrees(np.abs(finding.effect.rotation.T - turn)).max() < 3
     assert finding.std["roll_deg"] > 10 * finding.std["pitch_deg"]
-    assert "only together are they known" in finding.effect.explanation
+    assert any("roll and yaw turn about one axis" in line for line in finding.evidence)
     found.model.save(tmp_path / "turned.yaml")
     model = SensorModel.load(tmp_path / "turned.yaml")
     judged = validate(tuple(pair), model)

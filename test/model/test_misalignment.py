@@ -123,3 +123,16 @@ def test_a_stated_turn_stays_as_it_is_stated():
     effect, = (e for e in diagnosis.model.axis("x").effects if e.cause == "misalignment")
     assert effect.roll_deg == 10.0
     assert not diagnosis.findings
+
+
+@pytest.mark.parametrize("pitch", [-89.8, 89.8])
+def test_of_a_body_that_stands_on_end_one_angle_is_known_for_two(pitch):
+    """Roll and yaw moved together leave the turn as it is; what the words give does not move."""
+    rng = np.random.default_rng(6)
+    roll, yaw, both = rng.uniform(-180, 180, 3)
+    turns = [Misalignment(roll, pitch, yaw),
+             Misalignment(roll + both, pitch, yaw + both * np.sign(pitch))]
+    assert np.allclose(turns[0].rotation, turns[1].rotation, atol=0.02)
+    words = [turn.words_of_turn(1.5) for turn in turns]
+    assert words[0] == words[1] and "± 1.5 degrees, is known" in words[0][0]
+    assert Misalignment(roll, pitch / 2, yaw).words_of_turn(1.5) == []

@@ -251,6 +251,10 @@ class Effect:
         """
         return {}
 
+    def words_of_turn(self, angle_std_deg):
+        """What the uncertainties of `std_of_turn` do not say, as sentences without a full stop."""
+        return []
+
     @classmethod
     def column(cls, values):
         """What is added to samples, shape (n,), where its course in time is 1."""

@@ -13,16 +13,16 @@ from .fit_starts import Start, finite
 _AXES = "xyz"
 # Share of an axis that counts as the whole, for words.
 _WHOLE = 0.97
-# Cosine of the pitch below which roll and yaw turn about the same axis, and below which they nearly
-# do: less than rounding, and a tenth.
+# Cosine of the pitch below which roll and yaw turn about the same axis.
 _SAME_AXIS = 1e-6
-_NEARLY_SAME_AXIS = 0.1
 # Turn [degree] by which a small one is told, and up to which one is small.
 _SMALL_DEG, _LARGE_DEG = 0.1, 20.0
 # Least turn [degree] about an axis that the others show.
 _SEEN_DEG = 0.05
 # Standard uncertainty [degree] of an angle of which nothing is known.
 _ANY_ANGLE_DEG = 360 / np.sqrt(12)
+# Standard uncertainty from which an angle is said to be known with another one only.
+_OPEN_DEG = 10.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,12 +52,9 @@ class Misalignment(Effect):
     def __post_init__(self):
         words = [words for words in map(self.in_words, range(3)) if words]
         if words:
-            nearly = bool(abs(np.cos(np.radians(self.pitch_deg))) < _NEARLY_SAME_AXIS)
             # frozen: said once, of this turn
-            object.__setattr__(self, "explanation", f"{type(self).explanation[:-1]}: "
-                               f"{', '.join(words)}." + nearly * (
-                " With so much pitch, roll and yaw turn about nearly the same axis: only together "
-                "are they known."))
+            object.__setattr__(self, "explanation",
+                               f"{type(self).explanation[:-1]}: {', '.join(words)}.")
 
     @classmethod
     def of_turn(cls, rotation, beside=None):
@@ -78,6 +75,17 @@ class Misalignment(Effect):
         upright = max(abs(np.cos(np.radians(self.pitch_deg))), _SAME_AXIS)
         about_x_and_z = min(angle_std_deg / upright, _ANY_ANGLE_DEG)
         return {"roll_deg": about_x_and_z, "pitch_deg": angle_std_deg, "yaw_deg": about_x_and_z}
+
+    def words_of_turn(self, angle_std_deg):
+        if self.std_of_turn(angle_std_deg)["roll_deg"] < _OPEN_DEG:
+            return []
+        # at a pitch of 90 degrees both turn about one axis: upwards one way, downwards the other
+        up = self.pitch_deg > 0
+        known = self.roll_deg + (-self.yaw_deg if up else self.yaw_deg)
+        known -= 360 * np.round(known / 360)
+        return [f"at a pitch of {self.pitch_deg:.3g} degrees roll and yaw turn about one axis: "
+                f"only their {'difference' if up else 'sum'}, {known:.3g} ± {angle_std_deg:.2g} "
+                "degrees, is known"]
 
     @property
     def rotation(self):
