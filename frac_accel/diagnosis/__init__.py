@@ -193,22 +193,29 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     if engine.spikes.any():
         found.words.append(spikes_words(engine.spikes.sum()))
     _require_relation(engine, axis, seed)
-    begin, engine, best = _searched(begin, engine, seed)
-    if not is_stated and may_hide_one(engine, best):
-        begin, engine, best, seed = _with_a_spring(begin, engine, best, seed, engine_of, record)
-    elif not is_stated:
-        begin, engine, best, seed = _with_a_mount(begin, engine, best, seed, engine_of)
-    begin, engine, best = _with_unlike_axes(begin, engine, best, seed)
-    begin, engine, best = _with_a_course(begin, engine, best, seed)
-    if engine.part is None:
-        engine, best = _without_start(begin, engine, best, found)
-    engine, best = _without_drowned(begin, engine, best, found, seed)
-    engine, best = _without_known(begin, engine, best, seed)
+    engine, best = _beside_all_else(begin, engine, seed, record, None if is_stated else engine_of)
     stages.enter("judging what was found", JUDGED)
     judged = with_rival(judge(engine, best, found, shown, noise_std), rival)
     if orientation:
         judged = with_turn(judged, engine, orientation)
     return dataclasses.replace(judged, screened=screened(engine)) if screening else judged
+
+
+def _beside_all_else(begin, engine, seed, record, engine_of):
+    """Engine and its best set of causes, beside what else the record turns out to have: another
+    core, where none is stated (else `engine_of` is None), other filters of the other axes, courses
+    in time, and what drowns or is known of single samples."""
+    begin, engine, best = _searched(begin, engine, seed)
+    if engine_of is not None and may_hide_one(engine, best):
+        begin, engine, best, seed = _with_a_spring(begin, engine, best, seed, engine_of, record)
+    elif engine_of is not None:
+        begin, engine, best, seed = _with_a_mount(begin, engine, best, seed, engine_of)
+    begin, engine, best = _with_unlike_axes(begin, engine, best, seed)
+    begin, engine, best = _with_a_course(begin, engine, best, seed)
+    if engine.part is None:
+        engine, best = _without_start(begin, engine, best)
+    engine, best = _without_drowned(begin, engine, best, seed)
+    return _without_known(begin, engine, best, seed)
 
 
 def _with_limits(found, record, column, used):
@@ -469,12 +476,12 @@ def _with_courses(begin, engine, courses):
     return begin, other
 
 
-def _without_drowned(begin, engine, best, found, seed):
+def _without_drowned(begin, engine, best, seed):
     """Engine whose fits leave out the samples in which what the record shows by itself, or what
     happened once, drowns all else, and its best set; those given where there are none."""
     if engine.part is not None and is_nonlinear(best):
         return engine, best  # the whole of it would take too long
-    hidden = shown = drowned(engine, engine.on_whole(best), found)
+    hidden = shown = drowned(engine, engine.on_whole(best), engine.found)
     if not hidden.any() and engine.part is None and len(engine.record) == len(best.residual):
         hidden = event(best.residual, engine.problem.measured, engine.problem.used)
     if not hidden.any():
@@ -511,15 +518,15 @@ def _without_known(begin, engine, best, seed):
     return engine, best
 
 
-def _without_start(begin, engine, best, found):
+def _without_start(begin, engine, best):
     """Engine whose fits leave out how a strong force's motion begins, and its best set; those given
     where nothing stands out there."""
     early = start(engine, best)
     if not early.any():
         return engine, best
-    found.words.append(f"the first {early.sum() / engine.problem.rate:.2g} s count in no fit: how "
-                       "the mass moved before is not known, and with the forces that are found it "
-                       "is not forgotten sooner")
+    engine.found.words.append(
+        f"the first {early.sum() / engine.problem.rate:.2g} s count in no fit: how the mass moved "
+        "before is not known, and with the forces that are found it is not forgotten sooner")
     other = _beside(begin, engine, early)
     return other, other.run({cause: effect for cause, effect in best.effects.items()
                              if cause not in engine.search.base})
