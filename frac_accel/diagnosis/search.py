@@ -243,8 +243,7 @@ class Search:
             if anew:
                 # what only says the same does not take its place
                 near = [fit, *(other for other in near
-                               if self._strayed(other) < _STRAYED * self._strayed(fit)
-                               or self._tied(other.cost) < fit.cost)]
+                               if self._strayed(other) <= _STRAYED * self._strayed(fit))]
             better = self._leanest(near)
             if better is fit:
                 return fit
