@@ -108,9 +108,10 @@ class Stretches(Problem):
         more = {} if steps is None else {"steps": steps}
         return np.concatenate([part.simulate(effects, across, **more) for part in self.parts])
 
-    def change(self, effects, cause, effect):
+    def change(self, effects, cause, effect, by_links=True):
         """As `Problem.change`, stretch by stretch."""
-        return np.concatenate([part.change(effects, cause, effect) for part in self.parts])
+        return np.concatenate([part.change(effects, cause, effect, by_links)
+                               for part in self.parts])
 
     def let_go(self):
         """As `Problem.let_go`."""
