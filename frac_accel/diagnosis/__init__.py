@@ -28,7 +28,7 @@ from .courses import begun_with, beside, course_of, is_a_law, is_worth_it, refin
 from .engine import Engine
 from .event import event, start
 from .finding import Diagnosis, Finding, insufficient
-from .flat import by_its_lead_a_mount, flat_instead, with_a_mount, with_rival
+from .flat import by_its_lead_a_mount, flat_instead, is_a_mount, with_rival
 from .judgement import judge
 from .leftover import related
 from .off_clock import are_lost, clock_of, put_back, slips_of
@@ -349,10 +349,12 @@ def _with_a_mount(begin, engine, best, seed, engine_of):
     flat = SensorModel(Gain(p.baseline.axes[p.axis].core.sensitivity))
     own_begin, other = _with_courses(engine_of(flat, dict.fromkeys(_CORE, np.inf), {}), engine,
                                      engine.search.courses)
-    own_seed = with_a_mount(other, best, cause)
-    if own_seed is None:
+    own_seed = {name: effect for name, effect in best.effects.items()
+                if name in other.search.candidates and name != cause}
+    own_best = other.run(own_seed)
+    if not is_a_mount(best, own_best):
         return begin, engine, best, seed
-    return own_begin, other, other.run(own_seed), own_seed
+    return own_begin, other, own_best, own_seed
 
 
 def _searched(begin, engine, seed):

@@ -143,16 +143,10 @@ def by_its_lead_a_mount(engine, best):
     return None
 
 
-def with_a_mount(engine, best, cause):
-    """Effects of a gain's `engine` with one link in the place of an oscillator and a cause that is
-    the zero of a mount, beside all else that was found; None where that is not as good, with fewer
+def is_a_mount(best, other):
+    """Whether a gain's best set is as good as an oscillator's with the zero of a mount, with fewer
     parameters."""
-    search = engine.search
-    kept = {name: effect for name, effect in best.effects.items()
-            if name in search.candidates and name != cause and not effect.restates_core}
-    fits = _with_a_link(engine, search.fit({**search.base, **kept}))
-    return next((fit.effects for fit in fits if fit.cost <= _OF_A_MOUNT * best.cost
-                 and fit.size < best.size), None)
+    return other.cost <= _OF_A_MOUNT * best.cost and other.size < best.size
 
 
 def _or_with_a_link(own, before, fits):
