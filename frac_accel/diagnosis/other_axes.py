@@ -121,8 +121,9 @@ def with_unknown_turn(engine, fitted, finding):
     if effect.stage != OFFSET or not effect.everyday or not others:
         return finding
     responses = np.stack([p.response(other) for other in others], axis=1)
-    # gravity, where the reference does not show it
-    hidden = np.mean((p.record.sensor[:, others] - responses)[p.used], axis=0)
+    # gravity, where the reference does not show it; an axis that is not there shows nothing
+    shown = p.record.sensor[p.used][:, others]
+    hidden = np.where(np.ptp(shown, axis=0) > 0, np.mean(shown - responses[p.used], axis=0), 0.0)
     shares = np.zeros(len(AXES))
     for each in p.axis_model(fitted.effects).effects:
         if each.stage == CROSS_AXIS:
