@@ -154,8 +154,7 @@ class Filters:
         result = []
         for other in others:
             other = _thinned(other, step) if step > 1 else other
-            before, after = max(span[1], 0), max(-span[0], 0)
-            run = np.pad(other, (before, after))[before - span[1]:][:len(other) + len(taps) - 1]
+            run = _moving(other[None], span, np.zeros(1, int), len(other))[0, 0]
             through = oaconvolve(run, taps, "valid")
             result.append(_thickened(through, step, len(target)) if step > 1 else through)
         return result
@@ -234,15 +233,15 @@ class Filters:
         """Products of all shifted inputs over the samples of each run that count, shape (runs,
         size, size)."""
         grams = np.empty((len(starts), self.size, self.size))
-        groups = self._inputs
         for rows, length in _alike(starts, stops):
             own = starts[rows], stops[rows]
-            fixed = [_fixed(inputs, span[0], *own, length) for span, inputs, _ in groups]
-            moving = [_moving(inputs, span, own[0], length) for span, inputs, _ in groups]
-            for i, one in enumerate(groups):
-                for j, other in enumerate(groups[i:], start=i):
-                    part = self._filled(one, other, _sums(fixed[i], moving[j]),
-                                        _sums(fixed[j], moving[i]), *own)
+            fixed = [_fixed(inputs, span[0], *own, length) for span, inputs, _ in self._inputs]
+            moving = [_moving(inputs, span, own[0], length) for span, inputs, _ in self._inputs]
+            for i, one in enumerate(self._inputs):
+                for j, other in enumerate(self._inputs[i:], start=i):
+                    first = _sums(fixed[i], moving[j])
+                    column = first if j == i else _sums(fixed[j], moving[i])
+                    part = self._filled(one, other, first, column, *own)
                     grams[rows, one[-1], other[-1]] = part
                     if j > i:
                         grams[rows, other[-1], one[-1]] = part.transpose(0, 2, 1)

@@ -161,10 +161,9 @@ def every(values, first, step, count):
     low, high = np.clip([-(start // step), (len(values) - _LAGRANGE_POINTS - start) // step + 1],
                         0, count)
     inside = slice(low, max(high, low))
-    place = first + step * np.arange(count)
     result = np.empty(count)
     for beyond in (slice(0, inside.start), slice(inside.stop, count)):
-        result[beyond] = at_positions(values, place[beyond])
+        result[beyond] = at_positions(values, first + step * np.arange(beyond.start, beyond.stop))
     begins, ends = start + step * inside.start, start + step * inside.stop
     result[inside] = sum(weight * values[begins + i:ends + i:step][:inside.stop - inside.start]
                          for i, weight in enumerate(_lagrange(first - start)))
