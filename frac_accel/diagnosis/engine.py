@@ -20,7 +20,7 @@ from .names import on_bound, special_case
 from .noise_colour import lead, noise_peak
 from .other_axes import UNLIKE
 from .problem import Problem, acts_on_spring
-from .search import Search
+from .search import SAME, Search, mixes_otherwise
 from .seen import added, grows_with_motion
 from .stages import COMPARED
 from .stretches import Stretches, stretches_of
@@ -67,8 +67,7 @@ OF_MOTION = ("linear", "across", "even", "odd", "time_varying")
 _PLAINLY = 0.02
 # Share of what a set explains (power) that its core may leave to the others.
 _CORE = 0.005
-# Variances within which two sets say the same.
-_SAME = 1.0
+_NOT_MET = "not every cause met its rivals"
 # Times what is left where it acts that a cause must take (RMS) to stand alone there.
 _ALONE = 10.0
 # Share of the power that a slow zero adds by whose frequencies it counts, and their share of all.
@@ -84,13 +83,6 @@ _ERRS_THERE = 0.5
 _SLOW_PARTS, _ERRS_SLOWLY = 100, 0.2
 # Error of a simulation, and of values put on other instants, over the output's spread.
 _SIMULATED, _RESAMPLED = 3e-5, 1e-4
-
-
-def _mixes_otherwise(fit, best):
-    """Whether two sets differ by what mixes the axes, and by nothing else."""
-    apart = [fits.effects[cause] for fits, other in ((fit, best), (best, fit))
-             for cause in fits.causes - other.causes]
-    return bool(apart) and all(effect.stage == CROSS_AXIS for effect in apart)
 
 
 class Engine:
@@ -224,24 +216,12 @@ class Engine:
     def compete(self, best, unwanted=frozenset()):
         """Let every cause's nearest rivals take its place; the winner of all without some."""
         for _ in range(4):
-            unexplained = self.unexplained(best)
-            for cause in best.effects:
-                self.search.stages.enter_round(f"comparing {cause} with its rivals", COMPARED)
-                # nothing takes the place of one that is too weak to be named
-                if cause in self.search.base or \
-                        self.rms(self.added(best, cause)) < WEIGHS * unexplained:
-                    continue
-                if self.problem.limit.ends_rivalry("not every cause met its rivals"):
-                    self.uncontested.add(cause)
-                    continue
-                less = self.search.without(best, cause, best.cost + self.threshold(best))
-                self.search.fit_all([self.search.begun(less, rival, begin) for _, rival, begin in
-                                     self.search.screen(less)[:_RIVALS] if rival != cause]
-                                    + [best.effects])
+            with self.problem.limit.for_rivals():
+                self._meet_rivals(best)
             variance = self._variance(best)
             for rival in [fit for fit in self.search.fits.values()
-                          if _mixes_otherwise(fit, best) and abs(
-                              self.score(fit, variance) - self.score(best, variance)) < _SAME]:
+                          if mixes_otherwise(fit, best) and abs(
+                              self.score(fit, variance) - self.score(best, variance)) < SAME]:
                 # what says the same may do so with less beside it: a turn takes from the gain
                 self.search.prune(rival, self.threshold)
             near = sorted((fit for fit in self.search.fits.values()
@@ -253,6 +233,24 @@ class Engine:
                 return best
             best = winner
         return best
+
+    def _meet_rivals(self, best):
+        """Fit the nearest rivals of every cause of a set in its place, those of the strongest cause
+        first: time may end."""
+        unexplained, limit = self.unexplained(best), self.problem.limit
+        strength = {cause: self.rms(self.added(best, cause)) for cause in best.effects}
+        for cause in sorted(strength, key=strength.get, reverse=True):
+            self.search.stages.enter_round(f"comparing {cause} with its rivals", COMPARED)
+            # nothing takes the place of one that is too weak to be named
+            if cause in self.search.base or strength[cause] < WEIGHS * unexplained:
+                continue
+            if not limit.ends_search(_NOT_MET):
+                less = self.search.without(best, cause, best.cost + self.threshold(best))
+                self.search.fit_all([self.search.begun(less, rival, begin) for _, rival, begin in
+                                     self.search.screen(less)[:_RIVALS] if rival != cause]
+                                    + [best.effects])
+            if limit.ends_search(_NOT_MET):
+                self.uncontested.add(cause)
 
     def _general(self, near, variance):
         """The first of some fits by score; where it is a special case of one close behind, that."""
@@ -554,7 +552,7 @@ class Engine:
             if effect.everyday or cause in self.search.base:
                 continue
             plain = self.as_plain(best, cause)
-            nearly = _SAME / self.problem.count if is_noise or not is_link(effect) else _PLAINLY
+            nearly = SAME / self.problem.count if is_noise or not is_link(effect) else _PLAINLY
             if plain and plain.cost < (1 + nearly) * best.cost:
                 return plain
         return best

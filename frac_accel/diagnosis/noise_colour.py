@@ -1,7 +1,7 @@
 """Fits compared in noise of any colour."""
 
 import numpy as np
-from scipy.fft import rfft
+from scipy.fft import next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
 # Share of a spectrum's lines over which it is smoothed, and how many lines at least.
@@ -45,14 +45,19 @@ def _lead(ahead, behind, rows):
 
 
 def _density(values):
-    power = np.abs(rfft(values))**2
+    power = np.abs(_spectrum(values))**2
     return uniform_filter1d(power, max(_LINES, int(len(power) * _SMOOTH)), mode="reflect")
+
+
+def _spectrum(values):
+    """Spectrum of values that nothing follows, of a length that is transformed fast."""
+    return rfft(values, next_fast_len(len(values), real=True))
 
 
 def _in_noise(fit, used, noise):
     """Power of what a fit leaves over that of the noise, summed over samples."""
     def whitened(values):
-        lines = rfft(values * used) / np.sqrt(noise)
+        lines = _spectrum(values * used) / np.sqrt(noise)
         return np.concatenate([lines.real, lines.imag])
     residual = whitened(fit.residual)
     if fit.unknowns:

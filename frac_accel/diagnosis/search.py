@@ -9,6 +9,7 @@ from ..errors import FracAccelError
 from ..model import is_link
 from ..model.core import Oscillator
 from ..model.effects import IDENTIFIED, known_effects
+from ..model.effects.base import CROSS_AXIS
 from ..model.effects.fit_starts import EquationOfMotion
 from ..model.parameters import fixed_values, parameter_fields
 from ..shown import several
@@ -49,11 +50,17 @@ _FAR_LESS = 0.5
 _TIE = 10.0
 # Share of a cost within which two are the same.
 _ROUNDING = 1e-7
+# Variances within which two sets say the same.
+SAME = 1.0
 # Of those that are compared once more, how far one may have strayed that takes another's place [of
 # how far that has].
 _STRAYED = 0.5
 # Variances from the best fit of a round within which a fit must come if it goes on as it goes.
 _NEAR = 200.0
+# Times what a smaller set may be worse than a larger one, and is to first order, from which it is
+# not fitted.
+_BEYOND = 10.0
+_NOT_TRIED = "some sets of causes were not tried"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -166,15 +173,16 @@ class Search:
         for older in list(self.fits.values())[-2 * _AT_HAND:-most]:
             older.let_go()
 
-    def fit_all(self, sets, best=np.inf, goal=np.inf):
+    def fit_all(self, sets, best=np.inf, goal=np.inf, needed=False):
         """Fitted sets by cost; none of those that fall far behind (a cost) is fitted to the end.
 
-        Nor are those whose pace would not take them to a `goal` (a cost) or near the best.
+        Nor are those whose pace would not take them to a `goal` (a cost) or near the best, and,
+        once the search has used up its time, none but the best; unless they are `needed`.
         """
-        trials, best_before = {}, best
+        trials, best_before, first = {}, best, True
         for effects in sets:
             key = frozenset(effects)
-            if self.problem.limit.ends_search("some sets of causes were not tried"):
+            if not needed and self.problem.limit.ends_search(_NOT_TRIED):
                 break
             try:
                 known = self.fits.get(key)
@@ -188,6 +196,10 @@ class Search:
                 continue  # a motion without bound describes no record
             best = min(best, trials[key].cost)
         for key, trial in sorted(trials.items(), key=lambda entry: entry[1].cost):
+            if trial.rough and not first and self.problem.limit.ends_search(_NOT_TRIED):
+                del trials[key]
+                continue
+            first = False
             if trial.rough and trial.cost <= _HOPELESS * best:
                 try:
                     trial = self.problem.finished(trial, _BEHIND * best, goal)
@@ -535,10 +547,26 @@ class Search:
             if not fits or best.cost - fits[0].cost < threshold(fits[0]):
                 break
             gained, best = 1 - fits[0].cost / best.cost, fits[0]
-            beam = [fit for fit in fits[:_BEAM] if fit.cost <= _HOPELESS * best.cost]
+            beam = self._that_differ([fit for fit in fits[:_BEAM]
+                                      if fit.cost <= _HOPELESS * best.cost])
             if added >= 2 and gained < _STUCK and not done(best):
                 break
         return best
+
+    def _that_differ(self, fits):
+        """Some fits, less those that say the same as one before them but for what mixes the axes:
+        what joins one of them does the same beside the other."""
+        found = []
+        for fit in fits:
+            if not any(mixes_otherwise(fit, other) and self.say_the_same(fit, other)
+                       for other in found):
+                found.append(fit)
+        return found
+
+    def say_the_same(self, *fits):
+        """Whether the costs of two fits are the same to within the noise of a sample or so."""
+        costs = [fit.cost for fit in fits]
+        return max(costs) - min(costs) < SAME * min(costs) / self.problem.count
 
     def everyday(self, fitted):
         """Causes that are common and cheap, each from its best start.
@@ -552,18 +580,34 @@ class Search:
         """Leave out causes without which the record is described as well."""
         while True:
             goal = best.cost + threshold(best)
-            smaller = [self.without(best, cause, goal)
-                       for cause in best.effects if cause not in self.base]
+            smaller = [self.without(best, cause, goal) for cause in best.effects
+                       if cause not in self.base and not self._is_needed(best, cause, goal)]
             smaller = [fit for fit in smaller if fit.cost < goal]
             if not smaller:
                 return best
             best = min(smaller, key=lambda fit: fit.cost)
 
+    def _is_needed(self, best, cause, goal):
+        """Whether what is left without a cause, all others moved to first order, is beyond doubt
+        above a goal (a cost)."""
+        effects = {name: effect for name, effect in best.effects.items() if name != cause}
+        if best.effects[cause].restates_core or not effects:
+            return False
+        p = self.problem
+        try:
+            left = best.residual + p.clear(best.simulated - p.simulate(effects), best.free)
+        except FracAccelError:
+            return False
+        columns = best.jacobian[:, [unknown.cause != cause for unknown in best.unknowns]]
+        basis = _orthonormal(columns)
+        left = left - basis @ (basis.T @ left)
+        return float(left @ left) > max(goal + _BEYOND * (goal - best.cost), _BEHIND * goal)
+
     def without(self, fitted, cause, goal=np.inf):
         """The same set without one cause, fitted anew; not to the end if no pace to a goal."""
         less = self._left_to_others(fitted, cause)
         self._forget_worse(less, goal)
-        found = next(iter(self.fit_all([less], fitted.cost, goal)), None)
+        found = next(iter(self.fit_all([less], fitted.cost, goal, needed=True)), None)
         found = found or self.fit(less)
         gone = fitted.effects[cause]
         if goal < found.cost and not any(map(acts_on_spring, less.values())) and (
@@ -591,6 +635,13 @@ def acts_as_filter(effect):
     """Whether an effect changes different frequencies differently, if only by a delay."""
     return not effect.is_constant and bool(is_link(effect) or effect.pure_delay_s()
                                            or effect.restates_core)
+
+
+def mixes_otherwise(fit, best):
+    """Whether two sets differ by what mixes the axes, and by nothing else."""
+    apart = [fits.effects[cause] for fits, other in ((fit, best), (best, fit))
+             for cause in fits.causes - other.causes]
+    return bool(apart) and all(effect.stage == CROSS_AXIS for effect in apart)
 
 
 def _goal(effects, cost):

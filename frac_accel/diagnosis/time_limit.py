@@ -1,5 +1,6 @@
 """Budget of processor time: a search that has used it up says what it left out."""
 
+import contextlib
 import copy
 import time
 
@@ -7,7 +8,7 @@ from ..simulation.compiling import compiled_s
 
 # Share of the budget after which nothing new is tried, so that what is known can be judged; and in
 # a part of a long record, the whole of which has to be fitted, too.
-_SEARCH, _SEARCH_IN_PART = 0.75, 0.45
+_SEARCH, _SEARCH_IN_PART = 0.6, 0.4
 # The same for the rivals of what was found, without which nothing has a name.
 _RIVALS, _RIVALS_IN_PART = 0.85, 0.65
 
@@ -46,9 +47,14 @@ class TimeLimit:
         """Whether the search must end; notes what is left out because of it."""
         return self._over(self._search, words)
 
-    def ends_rivalry(self, words=None):
-        """Whether the rivals of what was found are no longer tried; notes it as `ends_search`."""
-        return self._over(self._rivals, words)
+    @contextlib.contextmanager
+    def for_rivals(self):
+        """While the rivals of what was found are tried, the search may take their share, too."""
+        search, self._search = self._search, self._rivals
+        try:
+            yield
+        finally:
+            self._search = search
 
     def ends_judging(self, words=None):
         """Whether nothing that can be spared is done any more."""
