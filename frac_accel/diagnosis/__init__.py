@@ -28,7 +28,14 @@ from .courses import begun_with, beside, course_of, is_a_law, is_worth_it, refin
 from .engine import Engine
 from .event import event, start
 from .finding import Diagnosis, Finding, insufficient
-from .flat import by_its_lead_a_mount, flat_instead, is_a_mount, with_rival
+from .flat import (
+    by_its_lead_a_mount,
+    flat_instead,
+    is_a_mount,
+    links_beside_core,
+    one_filter_instead,
+    with_rival,
+)
 from .judgement import judge
 from .leftover import related
 from .off_clock import are_lost, clock_of, put_back, slips_of
@@ -210,6 +217,7 @@ def _beside_all_else(begin, engine, seed, record, engine_of):
         begin, engine, best, seed = _with_a_spring(begin, engine, best, seed, engine_of, record)
     elif engine_of is not None:
         begin, engine, best, seed = _with_a_mount(begin, engine, best, seed, engine_of)
+        begin, engine, best, seed = _with_a_filter(begin, engine, best, seed, engine_of)
     begin, engine, best = _with_unlike_axes(begin, engine, best, seed)
     begin, engine, best = _with_a_course(begin, engine, best, seed)
     if engine.part is None:
@@ -346,15 +354,39 @@ def _with_a_mount(begin, engine, best, seed, engine_of):
     cause = by_its_lead_a_mount(engine, best)
     if cause is None or p.limit.ends_search("no mount was tried in the sensor's place"):
         return begin, engine, best, seed
-    flat = SensorModel(Gain(p.baseline.axes[p.axis].core.sensitivity))
-    own_begin, other = _with_courses(engine_of(flat, dict.fromkeys(_CORE, np.inf), {}), engine,
-                                     engine.search.courses)
+    own_begin, other = _with_courses(_flat(engine, engine_of), engine, engine.search.courses)
     own_seed = {name: effect for name, effect in best.effects.items()
                 if name in other.search.candidates and name != cause}
     own_best = other.run(own_seed)
     if not is_a_mount(best, own_best):
         return begin, engine, best, seed
     return own_begin, other, own_best, own_seed
+
+
+def _with_a_filter(begin, engine, best, seed, engine_of):
+    """Engine with a gain behind one filter in the place of an oscillator that was identified and a
+    link, what begins and seeds it, and its best set; those given where that is no leaner."""
+    p = engine.problem
+    links = links_beside_core(engine, best)
+    # with more of them, several filters are not known
+    if len(links) != 1 or engine.part or p.limit.ends_search(
+            "no filter was tried in the place of the sensor and a link"):
+        return begin, engine, best, seed
+    own_begin, other = _with_courses(_flat(engine, engine_of), engine, engine.search.courses)
+    found = one_filter_instead(other, best, links)
+    if found is None:
+        return begin, engine, best, seed
+    other.best = other.compete(other.search.prune(found, other.threshold))
+    return own_begin, other, other.best, {
+        cause: effect for cause, effect in other.best.effects.items()
+        if cause not in other.search.base}
+
+
+def _flat(engine, engine_of):
+    """What begins an engine with a gain in the place of another one's core."""
+    p = engine.problem
+    flat = SensorModel(Gain(p.baseline.axes[p.axis].core.sensitivity))
+    return engine_of(flat, dict.fromkeys(_CORE, np.inf), {})
 
 
 def _searched(begin, engine, seed):

@@ -98,6 +98,8 @@ _EDGE = 0.95
 _PEAKED, _AT_PEAK = 0.1, 10.0
 # Times as dense as in the octaves beside its resonance that what is left must be there to be of it.
 _DENSER = 10.0
+# Share of a core's pole within which a link's zero undoes it.
+_UNDOES = 0.1
 # Share of what is left around a mode's resonance without it from which it explains nothing there.
 _NO_LESS = 0.9
 # Damping ratio above which a mode beside the sensor's own hardly rings, and below which a peak is
@@ -174,7 +176,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
                          **_of_other_axes(engine, best),
                          **_at_the_edge(engine, best), **_hardly_rings(engine, best),
-                         **_out_of_sight(engine, best),
+                         **_out_of_sight(engine, best), **_undoes_the_core(engine, best),
                          **_rings_otherwise(engine, best, takes, noise),
                          **_nothing_at_its_peak(engine, best),
                          **_corrections(engine, best, takes)}.items():
@@ -689,6 +691,20 @@ def _at_the_edge(engine, best):
             found[cause] = f"it rings at {peaks.max():.3g} Hz, at the end of what is compared " \
                            f"({edge:.3g} Hz): what one of the two has lost there looks the same"
     return found
+
+
+def _undoes_the_core(engine, best):
+    """Links with a zero where the core that was identified has a pole: of both together a filter
+    with fewer poles does the same."""
+    core = engine.problem.axis_model(best.effects).effective_core
+    if not isinstance(core, Oscillator) or not _core_is_identified(engine):
+        return {}
+    poles = core.poles()
+    return {cause: f"its zero undoes a lag of {-pole.real / (2 * np.pi):.3g} Hz in the core that "
+                   "was identified: a filter in the place of both does the same"
+            for cause, effect in _filters(engine, best).items() if is_link(effect)
+            for zero in np.atleast_1d(effect.zeros()) for pole in poles
+            if abs(zero - pole) < _UNDOES * abs(pole)}
 
 
 def _out_of_sight(engine, best):

@@ -20,7 +20,7 @@ from .names import on_bound, special_case
 from .noise_colour import lead, noise_peak
 from .other_axes import UNLIKE
 from .problem import Problem, acts_on_spring
-from .search import SAME, Search, mixes_otherwise
+from .search import SAME, Search, acts_as_filter, mixes_otherwise
 from .seen import added, grows_with_motion
 from .stages import COMPARED
 from .stretches import Stretches, stretches_of
@@ -236,10 +236,12 @@ class Engine:
 
     def _meet_rivals(self, best):
         """Fit the nearest rivals of every cause of a set in its place, those of the strongest cause
-        first: time may end."""
+        first: time may end. A constant gain or offset is last, and needs none to have a name."""
         unexplained, limit = self.unexplained(best), self.problem.limit
         strength = {cause: self.rms(self.added(best, cause)) for cause in best.effects}
-        for cause in sorted(strength, key=strength.get, reverse=True):
+        plain = {cause for cause, effect in best.effects.items()
+                 if effect.everyday and not acts_as_filter(effect)}
+        for cause in sorted(strength, key=lambda cause: (cause in plain, -strength[cause])):
             self.search.stages.enter_round(f"comparing {cause} with its rivals", COMPARED)
             # nothing takes the place of one that is too weak to be named
             if cause in self.search.base or strength[cause] < WEIGHS * unexplained:
@@ -249,7 +251,7 @@ class Engine:
                 self.search.fit_all([self.search.begun(less, rival, begin) for _, rival, begin in
                                      self.search.screen(less)[:_RIVALS] if rival != cause]
                                     + [best.effects])
-            if limit.ends_search(_NOT_MET):
+            if cause not in plain and limit.ends_search(_NOT_MET):
                 self.uncontested.add(cause)
 
     def _general(self, near, variance):

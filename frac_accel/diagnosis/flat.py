@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model import SensorModel
+from ..model import SensorModel, is_link
 from ..model.core import Gain, Oscillator
 from ..model.effects import Effect, fault_of_reference, known_effects
 from ..model.parameters import parameter_fields
@@ -13,6 +13,7 @@ from .doubts import own_delay_s
 from .engine import LONG, Engine
 from .gain import gain
 from .off_clock import is_clock
+from .search import acts_as_filter
 from .stretches import strongest_part
 
 # Links that are fitted, and the share of an oscillator's residual power that one may leave: by
@@ -35,6 +36,9 @@ _OPEN_FROM = 2.0
 _AS_MUCH = 1.2
 # Variances of the noise within which a gain with one link describes a record as well.
 _AS_WELL = 10.0
+# Variances within which a gain with one filter says the same as an oscillator with a link, of more
+# parameters: no sensor's own would meet the shape of a filter by chance.
+_IN_PLACE_OF_BOTH = 30.0
 
 
 class Rival(NamedTuple):
@@ -147,6 +151,28 @@ def is_a_mount(best, other):
     """Whether a gain's best set is as good as an oscillator's with the zero of a mount, with fewer
     parameters."""
     return other.cost <= _OF_A_MOUNT * best.cost and other.size < best.size
+
+
+def links_beside_core(engine, best):
+    """Links of a set beside an oscillator, by cause; none beside another core."""
+    core = engine.problem.axis_model(best.effects).effective_core
+    return {cause: effect for cause, effect in best.effects.items()
+            if isinstance(core, Oscillator) and cause not in engine.search.base
+            and acts_as_filter(effect) and is_link(effect)}
+
+
+def one_filter_instead(engine, best, links):
+    """A gain's set with one filter in the place of an oscillator and a link, where it describes the
+    record as well with fewer parameters; or None. What comes across from other axes hides that from
+    `flat_instead`."""
+    search = engine.search
+    rest = {cause: effect for cause, effect in best.effects.items()
+            if cause in search.candidates and cause not in links}
+    fits = map(search.varied,
+               search.with_a_filter(search.fit({**search.base, **rest}), _FITTED))
+    enough = (1 + _IN_PLACE_OF_BOTH / engine.problem.count) * best.cost
+    return min((fit for fit in fits if fit.varied < best.varied and fit.cost <= enough),
+               key=lambda fit: fit.cost, default=None)
 
 
 def _or_with_a_link(own, before, fits):

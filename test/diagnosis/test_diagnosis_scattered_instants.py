@@ -88,3 +88,28 @@ def test_noise_that_grows_with_the_level_of_motion_is_no_scatter():
             record=SimpleNamespace(sampling_rate_hz=rate), used=np.ones(count, bool),
             measured=values, output=motion, is_coarse=False, slope_beyond=lambda noise: 0.0)
         assert SamplingJitter.recognised(seen, None) is None
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("clock", [0.0, 1.0])
+def test_a_delay_too_small_to_be_found_scatters_no_instants(clock, seed):
+    """13 us at 100 Hz, a fifteenth of what noise left, followed the square of the slope: 21 us."""
+    count, rate = 24_000, 100.0
+    rng = np.random.default_rng([94, seed])
+    motion = sosfiltfilt(butter(4, (0.5, 35), "band", fs=rate, output="sos"),
+                         rng.normal(size=count))
+    motion *= (1 + 0.9 * np.sin(np.arange(count) / 900)) / motion.std()
+    slope = np.fft.irfft(2j * np.pi * np.fft.rfftfreq(count) * np.fft.rfft(motion))
+    late = slope * (np.linspace(-1, 1, count) if clock else 1.0)
+    noise = rng.normal(size=count) + rng.uniform(0.25, 0.35) * late / late.std()
+    scatters, scatter = slope * rng.normal(size=count), 0.01 / slope.std()
+
+    def recognised(scatter):
+        return SamplingJitter.recognised(SimpleNamespace(
+            of_one_error=np.ones(1), found=SimpleNamespace(jitter_rms_s=0.0), repeated=0.0,
+            record=SimpleNamespace(sampling_rate_hz=rate), used=np.ones(count, bool),
+            output=motion, is_coarse=False, slope_beyond=lambda power: 0.0,
+            measured=motion + 0.01 * noise + scatter * scatters), None)
+    assert recognised(0.0) is None
+    named, reading = recognised(scatter)
+    assert abs(named.rms_s * rate - scatter) < 4 * reading.std["rms_s"] * rate < 0.2 * scatter

@@ -40,7 +40,7 @@ def record(seed):
     hertz = np.fft.rfftfreq(N, 1 / RATE)[:, None]
     late = np.fft.irfft(lines / (1 + 1j * hertz / rng.uniform(20, 60)), N, axis=0)
     sensor = late.copy()
-    sensor[:, 0] = rng.uniform(0.9, 0.95) * late[:, 0] + rng.uniform(0.02, 0.05) * late[:, 1]
+    sensor[:, 0] = rng.uniform(0.9, 0.95) * late[:, 0] + rng.uniform(0.1, 0.15) * late[:, 1]
     sensor += 0.01 * np.std(motion) * rng.normal(size=sensor.shape)
     return Record.of(*pair_of((motion, sensor), RATE, "x", "", ""), "x", None)
 
@@ -89,7 +89,7 @@ def engine_of(limit):
     engine = Engine(record(3), 0, MODEL, np.ones(N, bool), limit=limit,
                     candidates=searched(3, None).candidates)
     best = engine.search.fit({**sets()[0], **sets()[2],
-                              "cross_axis_sensitivity": EFFECTS["cross_axis_sensitivity"](0, 0.03)})
+                              "cross_axis_sensitivity": EFFECTS["cross_axis_sensitivity"](0, 0.1)})
     return engine, best
 
 
@@ -114,14 +114,16 @@ def test_the_strongest_cause_meets_its_rivals_first():
     engine.search.screen = screened
     engine.compete(best)
     strength = {cause: engine.rms(engine.added(best, cause)) for cause in best.effects}
-    strongest, second, *_ = sorted(strength, key=strength.get, reverse=True)
-    assert second in engine.uncontested and strongest not in engine.uncontested
+    assert max(strength, key=strength.get) == "low_pass_lag" not in engine.uncontested
+    # a gain needs none to have a name
+    assert engine.uncontested == {"cross_axis_sensitivity"} < best.causes
+    assert "sensitivity_error" in best.causes
 
 
 def test_two_sets_that_only_mix_the_axes_otherwise_are_one_that_grows():
     search = searched(4, None)
-    small = {"cross_axis_sensitivity": EFFECTS["cross_axis_sensitivity"](0, 0.03)}, \
-        {"misalignment": EFFECTS["misalignment"](0.0, 0.0, -1.7)}
+    small = {"cross_axis_sensitivity": EFFECTS["cross_axis_sensitivity"](0, 0.1)}, \
+        {"misalignment": EFFECTS["misalignment"](0.0, 0.0, -6.0)}
     begun = {**sets()[0], **sets()[2]}
     crossed, turned, plain = (search.fit({**begun, **more}) for more in (*small, {}))
     search.problem.limit = Clock()
@@ -137,7 +139,7 @@ def test_what_is_held_to_be_needed_is_needed(seed):
     rng = np.random.default_rng(seed)
     names = ["offset", "quadratic_stiffness"][:rng.integers(3)]
     best = search.fit({**sets()[0], **sets()[2], **sets()[1],
-                       "cross_axis_sensitivity": EFFECTS["cross_axis_sensitivity"](0, 0.03),
+                       "cross_axis_sensitivity": EFFECTS["cross_axis_sensitivity"](0, 0.1),
                        **{name: EFFECTS[name](0.01) for name in names}})
     goal = best.cost * (1 + 30 / search.problem.count)
     needed = {cause for cause in best.effects if search._is_needed(best, cause, goal)}

@@ -56,8 +56,8 @@ class SamplingJitter(Effect):
         if seen.repeated > _REPEATED:
             return None
         rate, used = seen.record.sampling_rate_hz, seen.used
-        error = (seen.measured - seen.output)[used]
         slope = slope_of(seen.output)
+        error = _without_delay((seen.measured - seen.output)[used], slope[used])
         bend = slope_of(slope)
         level = seen.output - seen.output[used].mean()
 
@@ -103,6 +103,13 @@ class SamplingJitter(Effect):
             {"rms_s": float(uncertain / rate)}, error, after,
             f"the error's power follows the square of the slope: {share:.0%} of it, "
             f"{factor / std:.3g} standard deviations from none")
+
+
+def _without_delay(error, slope):
+    """An error less what a constant delay and a clock that is off make of it, too small to have
+    been found: that follows the slope's sign as well."""
+    off = np.stack([slope, slope * np.linspace(-1, 1, len(slope))], axis=1)
+    return error - off @ np.linalg.lstsq(off, error, rcond=None)[0]
 
 
 def _other_powers(level, slope, bend, used):

@@ -1,0 +1,49 @@
+"""A link that undoes a part of the core that was identified: a filter in the place of both."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy.signal as sig
+
+from frac_accel import SensorModel
+from frac_accel.diagnosis.doubts import _undoes_the_core
+from frac_accel.diagnosis.engine import Engine
+from frac_accel.model.core import Oscillator
+from frac_accel.model.effects import known_effects
+from frac_accel.record import Record
+from frac_accel.record.sources import pair_of
+
+RATE, N = 4000.0, 8000
+EFFECTS = known_effects()
+
+
+def engine_and_fit(corner_hz, damping, link, is_known=False):
+    """A third-order Butterworth filter, fitted by an oscillator and a link."""
+    motion = sig.sosfiltfilt(sig.butter(4, 1500, fs=RATE, output="sos"),
+                             np.random.default_rng(3).normal(size=N))
+    turns = 1j * np.fft.rfftfreq(N, 1 / RATE) / corner_hz
+    sensor = np.fft.irfft(np.fft.rfft(motion) / ((1 + turns) * (1 + turns + turns**2)), N)
+    record = Record.of(*pair_of((motion, sensor), RATE, "x", "", ""), "x", None)
+    core = EFFECTS["core_parameter_shift"](corner_hz, damping)
+    engine = Engine(record, 0, SensorModel(Oscillator(corner_hz, damping, sensitivity=1.0)),
+                    np.ones(N, bool), base={core.cause: core},
+                    loose={core.cause: SimpleNamespace(effect=core, is_known=is_known)})
+    return engine, engine.search.fit({core.cause: core, link.cause: link})
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_mount_that_undoes_a_lag_of_the_core_is_in_doubt(seed):
+    corner = np.random.default_rng([7, seed]).uniform(600, 1000)
+    mount = EFFECTS["mounting_resonance"](corner, 0.5)
+    engine, fit = engine_and_fit(corner, 0.999, mount)
+    assert fit.cost < 1e-4 * np.sum(engine.problem.measured**2)  # it is the filter
+    words = _undoes_the_core(engine, fit)["mounting_resonance"]
+    assert words.startswith("its zero undoes a lag of")
+    # what the sensor's maker states is there, whatever a mount does beside it
+    assert not _undoes_the_core(*engine_and_fit(corner, 0.999, mount, is_known=True))
+
+
+def test_a_lag_beside_a_resonance_undoes_nothing():
+    engine, fit = engine_and_fit(800.0, 0.5, EFFECTS["low_pass_lag"](800.0))
+    assert not _undoes_the_core(engine, fit)
