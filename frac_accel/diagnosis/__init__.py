@@ -364,13 +364,11 @@ def _with_a_mount(begin, engine, best, seed, engine_of):
 
 
 def _with_a_filter(begin, engine, best, seed, engine_of):
-    """Engine with a gain behind one filter in the place of an oscillator that was identified and a
-    link, what begins and seeds it, and its best set; those given where that is no leaner."""
-    p = engine.problem
+    """Engine with a gain behind one filter in the place of an oscillator that was identified and of
+    links, what begins and seeds it, and its best set; those given where that is no leaner."""
     links = links_beside_core(engine, best)
-    # with more of them, several filters are not known
-    if len(links) != 1 or engine.part or p.limit.ends_search(
-            "no filter was tried in the place of the sensor and a link"):
+    if not links or engine.part or engine.problem.limit.ends_search(
+            "no filter was tried in the place of the sensor and its links"):
         return begin, engine, best, seed
     own_begin, other = _with_courses(_flat(engine, engine_of), engine, engine.search.courses)
     found = one_filter_instead(other, best, links)

@@ -162,7 +162,7 @@ def links_beside_core(engine, best):
 
 
 def one_filter_instead(engine, best, links):
-    """A gain's set with one filter in the place of an oscillator and a link, where it describes the
+    """A gain's set with one filter in the place of an oscillator and links, where it describes the
     record as well with fewer parameters; or None. What comes across from other axes hides that from
     `flat_instead`."""
     search = engine.search

@@ -57,8 +57,8 @@ SAME = 1.0
 _STRAYED = 0.5
 # Variances from the best fit of a round within which a fit must come if it goes on as it goes.
 _NEAR = 200.0
-# Times what a smaller set may be worse than a larger one, and is to first order, from which it is
-# not fitted.
+# Times the excess that a smaller set may have over a larger one, from which on, to first order, it is
+# not even fitted.
 _BEYOND = 10.0
 _NOT_TRIED = "some sets of causes were not tried"
 
@@ -558,12 +558,12 @@ class Search:
         what joins one of them does the same beside the other."""
         found = []
         for fit in fits:
-            if not any(mixes_otherwise(fit, other) and self.say_the_same(fit, other)
+            if not any(mixes_otherwise(fit, other) and self._say_the_same(fit, other)
                        for other in found):
                 found.append(fit)
         return found
 
-    def say_the_same(self, *fits):
+    def _say_the_same(self, *fits):
         """Whether the costs of two fits are the same to within the noise of a sample or so."""
         costs = [fit.cost for fit in fits]
         return max(costs) - min(costs) < SAME * min(costs) / self.problem.count

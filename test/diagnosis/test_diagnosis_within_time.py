@@ -127,7 +127,7 @@ def test_two_sets_that_only_mix_the_axes_otherwise_are_one_that_grows():
     begun = {**sets()[0], **sets()[2]}
     crossed, turned, plain = (search.fit({**begun, **more}) for more in (*small, {}))
     search.problem.limit = Clock()
-    assert search.say_the_same(crossed, turned)
+    assert search._say_the_same(crossed, turned)
     assert search._that_differ([crossed, turned, plain]) == [crossed, plain]
     assert search._that_differ([turned, crossed, plain]) == [turned, plain]
 
