@@ -57,8 +57,8 @@ SAME = 1.0
 _STRAYED = 0.5
 # Variances from the best fit of a round within which a fit must come if it goes on as it goes.
 _NEAR = 200.0
-# Times the excess that a smaller set may have over a larger one, from which on, to first order, it is
-# not even fitted.
+# Times the excess that a smaller set may have over a larger one, from which on, to first order, it
+# is not even fitted.
 _BEYOND = 10.0
 _NOT_TRIED = "some sets of causes were not tried"
 

@@ -55,8 +55,8 @@ def test_a_filter_of_third_order_is_named_beside_a_turn_that_was_not_known(seed)
     """An oscillator and a lag bent themselves to what came across: 3 % less than the filter left."""
     rng = np.random.default_rng([8, seed])
     fine, count, corner = 8, 3 * N, rng.uniform(0.22, 0.27) * RATE
-    turns = np.cumsum(28 + 16 * np.sin(np.arange(fine * count) / (fine * RATE) * 2 * np.pi / 5)) \
-        / (fine * RATE)
+    time = np.arange(fine * count) / (fine * RATE)
+    turns = np.cumsum(28 + 16 * np.sin(2 * np.pi * time / 5)) / (fine * RATE)
     # an engine: all axes have its orders, each with a phase of its own
     motion = sum(np.cos(2 * np.pi * order * turns[:, None] + rng.uniform(0, 7, 3))
                  * rng.uniform(0.5, 1, 3) for order in (*range(2, 32, 2), 1, 5))
