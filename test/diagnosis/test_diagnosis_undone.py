@@ -52,7 +52,7 @@ def test_a_lag_beside_a_resonance_undoes_nothing():
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", range(2))
 def test_a_filter_of_third_order_is_named_beside_a_turn_that_was_not_known(seed):
-    """An oscillator and a lag bent themselves to what came across: 3 % less than the filter left."""
+    """An oscillator and a lag bent themselves to what came across, and left a little less."""
     rng = np.random.default_rng([8, seed])
     fine, count, corner = 8, 3 * N, rng.uniform(0.22, 0.27) * RATE
     time = np.arange(fine * count) / (fine * RATE)
