@@ -466,7 +466,9 @@ def _with_unlike_axes(begin, engine, best, seed):
         return begin, engine, best
     own_begin = functools.partial(begin, others=dataclasses.replace(p.others, alike=False))
     other = _beside(own_begin, engine, np.zeros(len(engine.wanted), bool))
-    own_best = other.run(seed)
+    # most of what was found holds there, too: what does not is left out again
+    own_best = other.run({cause: effect for cause, effect in best.effects.items()
+                          if cause in other.search.candidates} or seed)
     if own_best.cost - best.cost > (engine.part or engine).threshold(best):
         return begin, engine, best
     return own_begin, other, own_best

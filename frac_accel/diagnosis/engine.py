@@ -117,7 +117,7 @@ class Engine:
         # limit, and those in which it drowns all else
         self.at_limit = self.drowned = np.zeros(len(record), bool)
         self._learnt, self._budgets, self._structures, self._left = {}, {}, {}, {}
-        self._audible, self._peaks = {}, {}
+        self._audible, self._peaks, self._in_all = {}, {}, {}
         # what the numerics may still be wrong by: of the simulation, and of other instants
         self.floor = (_RESAMPLED if record.resampled else _SIMULATED) \
             * float(np.std(record.sensor[used, axis]))
@@ -270,15 +270,15 @@ class Engine:
                         and fit.cost < winner.cost + _CLOSE * variance),
                        key=lambda fit: self.score(fit, winner.cost / self.problem.count))
         close = [(self._margin(fit, winner, variance), fit) for fit in close[:2 * _RIVALS]
-                 if not self.hollow(fit) and self._leave_coloured_noise(fit, winner)]
+                 if not self.hollow(fit) and self._leave_coloured_noise(winner, fit)]
         margin, ahead = min(close, key=lambda entry: entry[0], default=(0.0, winner))
         return ahead if margin < -_AHEAD else winner
 
-    def _leave_coloured_noise(self, *fits):
-        """Whether all of some fits leave what has a colour, and one of them nothing that follows
-        the motion: what wanders, tones and bursts are no more than loud where they are."""
-        return all(self._peak(fit) > _COLOURED for fit in fits) \
-            and any(not any(part in OF_MOTION for _, part in self.structure(fit)) for fit in fits)
+    def _leave_coloured_noise(self, best, rival):
+        """Whether two fits leave what has a colour, and the best nothing that follows the motion:
+        what wanders, tones and bursts are no more than loud where they are."""
+        return all(self._peak(fit) > _COLOURED for fit in (best, rival)) \
+            and not any(part in OF_MOTION for _, part in self.structure(best))
 
     def hollow(self, fitted):
         """Whether a cause of a fit lies at the end of what was searched, or is, within its
@@ -775,13 +775,25 @@ class Engine:
 
     def noise_only(self, fitted):
         """Whether a fit leaves nothing but noise."""
-        return self.left(fitted).share == 0
+        return _unless_it_grows(self._left_in_all(fitted)).share == 0 == self.left(fitted).share
 
     def left(self, fitted):
         """What the residual still holds."""
         return _once(self._left, fitted, self._left_of)
 
     def _left_of(self, fitted):
+        found = self._left_in_all(fitted)
+        # what grows is asked for only where it decides
+        if self.found is not None and found.share > _unless_it_grows(found).share \
+                and grows_with_motion(self, fitted):
+            return dataclasses.replace(found, level=0.0, level_score=0.0)
+        return found
+
+    def _left_in_all(self, fitted):
+        """The same, with noise that grows with the motion."""
+        return _once(self._in_all, fitted, self._left_in_all_of)
+
+    def _left_in_all_of(self, fitted):
         p = self.problem
         across = [signal for axis, signal in enumerate(p.record.reference.T)
                   if axis != p.axis and np.ptp(signal)]
@@ -793,8 +805,6 @@ class Engine:
                 of_all = (rest.rms / found.rms)**2
                 found = dataclasses.replace(rest, rms=found.rms, linear=of_all * rest.linear,
                                             level=of_all * rest.level)
-            if grows_with_motion(self, fitted):
-                found = dataclasses.replace(found, level=0.0, level_score=0.0)
         own = self._no_fault(fitted)
         return dataclasses.replace(found, linear=max(found.linear - own, 0.0),
                                    level=max(found.level - own, 0.0))
@@ -805,11 +815,16 @@ class Engine:
         found = self.left(fitted)
         predicted = [entry for entry in self._audible_parts(fitted) if entry["part"] != "noise"
                      and entry["share"] > _OF_NOISE.get(entry["part"], _PART)]
-        return found if predicted else dataclasses.replace(found, level_score=0.0)
+        return found if predicted else _unless_it_grows(found)
 
     def _leftover(self, fitted, residual, across):
         return leftover(residual, fitted.simulated, self.problem.used, across,
                         self.coarse_step(fitted))
+
+
+def _unless_it_grows(left):
+    """A `Leftover` without what only comes and goes with the motion."""
+    return dataclasses.replace(left, level_score=0.0)
 
 
 def _once(store, fitted, make):

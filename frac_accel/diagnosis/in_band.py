@@ -32,8 +32,9 @@ class InBand:
         of `simulation.sampled`."""
         if self._fine == 1:
             return self.filtered(sampled(fine, steps, count, late))
-        fine = fine if late else fine[:steps * count]
-        return sampled(self.filtered(fine, steps), steps, count, late)
+        whole = int(np.floor(late))
+        later = np.r_[np.full(whole, fine[0]), fine] if whole > 0 else fine[-whole:]
+        return self.filtered(later[:steps * count], steps, late - whole)
 
     def behind(self, effect, values, whole, circumstances):
         """Samples behind a law of the output, and those before any filter.
@@ -58,6 +59,7 @@ class InBand:
         change = effect.live(self._fine * self._rate).simulate(fine, circumstances) - fine
         return [values + self.added(change, self._fine, len(whole)), whole + change[::self._fine]]
 
-    def filtered(self, values, steps=1):
-        """What of values, shape (n,), with as many in each interval, the record's filter leaves."""
-        return inner_filter(steps * self._rate, self._band_hz, len(values))(values)
+    def filtered(self, values, steps=1, late=0.0):
+        """What of values, shape (steps n,), with as many in each interval, the record's filter
+        leaves at its instants, shape (n,), or `late`, by a part of such a value."""
+        return inner_filter(steps * self._rate, self._band_hz, len(values), steps)(values, late)

@@ -311,10 +311,11 @@ class Problem:
         before = {**linear, cause: effects[cause]} if cause in effects else linear
         across = effect.stage == CROSS_AXIS or (
             by_links and is_link(effect) and self.others.have(effect))
-        # where all of a path is new, few steps show as much as a first order is worth
-        few = cause not in effects and follows_path(effect)
-        return self.simulate({**linear, cause: effect}, across,
-                             _STEPS_OF_SLOPES if few else _STEPS) - self._remembered(before, across)
+        # beside a path, few steps show as much of what joins it as a first order is worth
+        few = cause not in effects and any(map(follows_path, [effect, *linear.values()]))
+        steps = _STEPS_OF_SLOPES if few else _STEPS
+        return self.simulate({**linear, cause: effect}, across, steps) \
+            - self._remembered(before, across, steps)
 
     def joined(self, effects, cause, effect):
         """Change of the output, shape (n,), when a cause joins others, for a screening: to first
@@ -344,11 +345,11 @@ class Problem:
             self._moved = model, self.simulator(self.axis).respond(model)
         return self._moved[1]
 
-    def _remembered(self, effects, across):
+    def _remembered(self, effects, across, steps=_STEPS):
         """Output with these causes; the last one is kept."""
-        key = across, *effects.items()
+        key = across, steps, *effects.items()
         if self._last[0] != key:
-            self._last = key, self.simulate(effects, across)
+            self._last = key, self.simulate(effects, across, steps)
         return self._last[1]
 
     def free_columns(self, effects):

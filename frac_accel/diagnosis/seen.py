@@ -243,8 +243,8 @@ def grows_with_motion(engine, fitted):
 def is_noise(engine, fitted):
     """Whether a fit leaves noise, or bursts of it, beside a motion that lasts: what the size of a
     residual tells presumes that."""
-    return all(part == "bursts" for _, part in engine.structure(fitted)) \
-        and _moving_share(engine.problem.record.reference[:, engine.problem.axis]) > _LASTS
+    return _moving_share(engine.problem.record.reference[:, engine.problem.axis]) > _LASTS \
+        and all(part == "bursts" for _, part in engine.structure(fitted))
 
 
 def _moving_share(reference):

@@ -3,8 +3,12 @@
 `scipy.signal` and `scipy.interpolate` are imported where they are used: most records need neither.
 """
 
-import numpy as np
+import functools
 
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+
+from ..signals.convolution import exponentials
 from .clock import merged
 
 # Highest frequency that is kept, and lowest that is gone, of the rate that is asked for: what lies
@@ -97,15 +101,38 @@ def inner_taps(rate_hz, band_hz, count):
     return firwin(2 * half + 1, (1 + _INNER) / 2 * band_hz, window=("kaiser", _KAISER), fs=rate_hz)
 
 
-def inner_filter(rate_hz, band_hz, count):
-    """The same as a function of so many samples, without delay."""
-    from scipy.signal import oaconvolve
-    taps = inner_taps(rate_hz, band_hz, count)
+def inner_filter(rate_hz, band_hz, count, every=1):
+    """The same as a function of so many samples, without delay; of what it leaves, which is slow,
+    each so many-th sample is enough. These may be taken `late`, by a part of a sample."""
+    half, length, transfer = _inner_transfer(rate_hz, band_hz, count, every)
 
-    def inside(values):
-        longer = np.pad(values, len(taps) // 2, mode="reflect", reflect_type="odd")
-        return oaconvolve(longer, taps, mode="valid")
+    def inside(values, late=0.0):
+        # an odd reflection at both ends
+        longer = np.zeros(length * every)
+        first, behind = half + count, min(half, count - 1)
+        longer[half:first] = values
+        longer[half - behind:half] = 2 * values[0] - values[behind:0:-1]
+        longer[first:first + behind] = 2 * values[-1] - values[-2:-2 - behind:-1]
+        lines = rfft(longer)[:len(transfer)]
+        lines *= transfer
+        if late:
+            lines *= exponentials(0.0, -2j * np.pi * late / len(longer), len(lines))
+        return irfft(lines, length)[half // every:][:-(-count // every)]
     return inside
+
+
+@functools.lru_cache(maxsize=8)
+def _inner_transfer(rate_hz, band_hz, count, every):
+    """Half-width of that filter, a multiple of `every`; samples of what comes out of a transform
+    that holds it with the reflections at both ends; and its response on the lines of these."""
+    taps = inner_taps(rate_hz, band_hz, count)
+    reach = len(taps) // 2
+    half = -(-reach // every) * every
+    length = next_fast_len(-(-(count + 2 * half) // every), real=True)
+    centred = np.zeros(length * every)
+    centred[:reach + 1], centred[len(centred) - reach:] = taps[reach:], taps[:reach]
+    # symmetric, so that its response is real
+    return half, length, rfft(centred)[:length // 2 + 1].real / every
 
 
 def within(values, rate_hz, band_hz, unknown):
