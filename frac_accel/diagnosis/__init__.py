@@ -13,7 +13,7 @@ from ..budget.reference_noise import reference_noise
 from ..errors import FracAccelError, IdentificationError
 from ..identification.checks.clipped import clipped_sensor
 from ..identification.checks.record_checks import moving_samples, unclipped_reference
-from ..identification.response.excitation import held_out, require_excitation
+from ..identification.response.excitation import held_out_of, require_excitation
 from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC
 from ..model import AXES, SensorModel
 from ..model.core import Gain, Oscillator
@@ -592,7 +592,7 @@ def _shown(found, record, column, used):
 def _too_poor(record, column, used, model):
     """Words where a record holds too little to be judged, or, without a model, to identify one."""
     reference = record.reference[:, column]
-    last = held_out(reference)
+    last = held_out_of(reference, used)
     for rows, part in ((used & ~last, "training"), (used & last, "held-out")):
         if rows.sum() < _FEWEST // 4:
             return f"only {rows.sum()} {part} samples; {_FEWEST // 4} needed"

@@ -10,7 +10,12 @@ from scipy.ndimage import uniform_filter1d
 from ..budget import Division, established_noise
 from ..errors import FracAccelError
 from ..identification.fit.uncertainty import by_blocks, sandwich
-from ..identification.response.excitation import STRETCHES, alternating_stretches, held_out, is_new
+from ..identification.response.excitation import (
+    STRETCHES,
+    alternating_stretches,
+    held_out_of,
+    is_new,
+)
 from ..model import is_link
 from ..model.effects import effect_of
 from ..model.effects.base import CROSS_AXIS
@@ -136,7 +141,7 @@ class Engine:
         """
         p = self.problem
         reference = p.record.reference[:, p.axis]
-        last = held_out(reference)
+        last = held_out_of(reference, p.used)
         error = self.search.baseline.residual
         length = max(len(error) // _SLOW_PARTS, 1)
         slow = uniform_filter1d(error, length)

@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 
+from ..identification.response.excitation import held_out_of
 from ..model import AXES, AxisModel, SensorModel
 from ..model.effects import known_effects
-from .engine import held_out
 from .finding import Finding
 from .gain import certainty, gain
 from .words import gain_words
@@ -39,7 +39,8 @@ def with_turn(judged, engine, orientation):
     after = engine.problem.errors(engine.search.baseline)
     published = (turned @ orientation.rotation.T)[:, axis]
     simulated = engine.search.baseline.output
-    rows = engine.wanted & np.isfinite(after) & held_out(engine.record.reference[:, axis])
+    known = engine.wanted & np.isfinite(after)
+    rows = known & held_out_of(engine.record.reference[:, axis], known)
     # gravity, which a reference may not show, says nothing of a turn
     published = published - np.mean((published - turned[:, axis])[rows])
     before = after + published - turned[:, axis]

@@ -155,7 +155,8 @@ def _named(engine, likely, shown_by, back):
                 *(suspect({cause}, 0.0, words) for cause, words in doubted.items())]
     findings = _without_mean_delay([
         *(with_unknown_turn(engine, fitted, finding) for finding in findings), *away,
-        *(f for f in drifts if f.cause not in back), *shown_by(fitted)])
+        *(f for f in drifts if f.cause not in back),
+        *_shown(shown_by, fitted, (best, likely.widest))])
     unnamed = sorted(fitted.causes - {f.cause for f in findings} - engine.search.base.keys())
     # what was in doubt in a part of the record, or beside something else, is no suspect any more
     suspects = [each for each in suspects
@@ -172,6 +173,16 @@ def _named(engine, likely, shown_by, back):
         account = _account(engine, fitted, findings, likely.noise)
     return Named(findings, suspects, unnamed + sorted(other_course), fitted, stds, complete, left,
                  fraction, account, engine.structure(fitted))
+
+
+def _shown(shown_by, fitted, wider):
+    """Findings that the record shows by itself beside what is named; and of what goes with the
+    motion's size, beside wider fits: the error of what is only suspected would hide its law."""
+    shown = shown_by(fitted)
+    for fit in wider:
+        if fit is not fitted and not any(f.effect.goes_with_size for f in shown):
+            shown = [*shown, *(f for f in shown_by(fit) if f.effect.goes_with_size)]
+    return shown
 
 
 def _without_mean_delay(findings):

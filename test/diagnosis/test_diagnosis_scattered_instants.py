@@ -8,7 +8,9 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import butter, sosfiltfilt
 
 from frac_accel import Samples, SensorModel, diagnose
+from frac_accel.diagnosis.verdict import _shown
 from frac_accel.model.core import Gain
+from frac_accel.model.effects import known_effects
 from frac_accel.model.effects.sampling_jitter import SamplingJitter
 
 RATE, FINE = 10e3, 32
@@ -113,3 +115,17 @@ def test_a_delay_too_small_to_be_found_scatters_no_instants(clock, seed):
     assert recognised(0.0) is None
     named, reading = recognised(scatter)
     assert abs(named.rms_s * rate - scatter) < 4 * reading.std["rms_s"] * rate < 0.2 * scatter
+
+
+def test_a_scatter_that_only_a_wider_fit_shows_is_named():
+    """Beside what is named alone, the error of what is only suspected hides the law of a scatter;
+    what is no scatter is told beside what is named."""
+    scatter, tone = (SimpleNamespace(effect=known_effects()[cause](**values)) for cause, values in
+                     (("sampling_jitter", {"rms_s": 1e-3}),
+                      ("interference_bursts", {"share": 0.1, "rms": 1.0})))
+    named, best, widest = object(), object(), object()
+    shown = {named: [], best: [tone], widest: [scatter, tone]}
+    assert _shown(shown.get, named, (best, widest)) == [scatter]
+    assert _shown(shown.get, widest, (best, widest)) == [scatter, tone]
+    shown[named] = [scatter]
+    assert _shown(shown.get, named, (best, widest)) == [scatter]

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from ...errors import IdentificationError
+from ...signals.averaged_spectra import coherence_of, power_of, segment_spectra
 from ..fit.output_error import Fit, fit_output_error
 from ..fit.structures import OscillatorStructure
 from ..fit.uncertainty import SIGNIFICANT
@@ -28,14 +29,20 @@ _PEAK = 0.6
 _SAMPLES = 0.1
 _NOTED = 0.5
 _KNOWN = 0.2
+# Segments of a stretch by which coherence is judged.
+_SEGMENTS = 16
 
 
 @dataclasses.dataclass(frozen=True)
 class _Way:
-    """A classical sensor fitted in one direction."""
+    """A classical sensor fitted in one direction.
+
+    What it leaves of the output (RMS) is `unexplained`; `unrelated`, what no linear sensor takes.
+    """
 
     fit: Fit
     unexplained: float
+    unrelated: float
     sample_s: float
 
     @classmethod
@@ -48,7 +55,13 @@ class _Way:
                                    pair.sampling_rate_hz, valid, lag_s)
         except IdentificationError:
             return None
-        return cls(fit, fit.rmse / float(np.std(sensor[part][valid])), 1 / pair.sampling_rate_hz)
+        return cls(fit, fit.rmse / float(np.std(sensor[part][valid])),
+                   _unrelated(reference[part], sensor[part]), 1 / pair.sampling_rate_hz)
+
+    @property
+    def lacking(self):
+        """What another linear sensor might take of what this one leaves (RMS, of the output)."""
+        return np.sqrt(max(self.unexplained**2 - self.unrelated**2, 0.0))
 
     @property
     def lead_s(self):
@@ -82,6 +95,15 @@ class _Way:
     def determined(self):
         """Whether the parameters are those of a sensor, not of anything with a slope."""
         return np.all(self.fit.std[:3] < _KNOWN * np.abs(self.fit.values[:3]))
+
+
+def _unrelated(reference, sensor):
+    """Share of the sensor's signal (RMS) that is not coherent with the reference."""
+    own, answer = (segment_spectra(values, "hann", max(len(values) // (_SEGMENTS // 2), 1))
+                   for values in (reference, sensor))
+    power = power_of(answer)
+    alone = np.sum((1 - coherence_of(own, answer)) * power)
+    return float(np.sqrt(alone / max(power.sum(), 1e-300)))
 
 
 def exchanged_instead(reference, sensor, pair):
@@ -146,7 +168,8 @@ def _exchanged(forward, reference, sensor, pair):
         return None
     if forward is None:
         return _error("no sensor answers like this", backward) if backward.is_sensor else None
-    ratio = backward.unexplained / forward.unexplained
+    # a filter would take noise and tones from the sensor, were that the reference
+    ratio = backward.unexplained / max(forward.lacking, 1e-300)
     decisive = ratio < _SHAPE or (ratio < _SHAPE_AND_DELAY and forward.early and backward.causal)
     if not backward.is_sensor or not decisive:
         return None

@@ -303,6 +303,15 @@ def held_out(reference, valid=None):
     return last
 
 
+def held_out_of(reference, used):
+    """The same; where hardly any that count would be on either side, as after a sensor has failed,
+    by the energy of those that count."""
+    rest = held_out(reference)
+    few = _FEW_SAMPLES * used.sum()
+    return rest if min(np.sum(used & rest), np.sum(used & ~rest)) > few \
+        else held_out(reference, used)
+
+
 def alternating_stretches(reference, count):
     """Every other of `count` stretches in which the reference has equal energy, as a mask.
 
