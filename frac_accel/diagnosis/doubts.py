@@ -8,7 +8,7 @@ from scipy.ndimage import uniform_filter1d
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.core import Oscillator
-from ..model.effects.base import CROSS_AXIS, GAIN, OFFSET, Effect
+from ..model.effects.base import GAIN, OFFSET, Effect
 from .courses import with_level
 from .engine import LONG, WEIGHS
 from .gradual import gradual
@@ -140,7 +140,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                                      "left, which nothing shows to be noise")
         # noise makes nothing that changes with time, or that goes with other axes
         if rms < AS_NOISE * own and not best.effects[cause].shows_with_time \
-                and best.effects[cause].stage != CROSS_AXIS:
+                and not best.effects[cause].mixes_axes:
             doubts.setdefault(cause, f"what it explains ({rms:.3g} RMS) is no more than what the "
                                      f"reference's own noise makes ({own:.3g} RMS)")
     if min(takes.values(), default=np.inf) < WEIGHS * left.rms:
@@ -223,7 +223,7 @@ def _as_slow(engine, best, added, takes):
         if takes[cause] < _SLOW_TIMES * wanders and not _is_as_strong_fast(p, best, change):
             found[cause] = f"what it explains is slow ({takes[cause]:.3g} RMS), and what is left " \
                            f"wanders by {wanders:.3g} RMS"
-        elif turned_back and best.effects[cause].stage != CROSS_AXIS:
+        elif turned_back and not best.effects[cause].mixes_axes:
             found[cause] = f"what it explains is slow ({takes[cause]:.3g} RMS), as the " \
                            f"reference's own noise is where {turned_back[0]} is turned back"
     return found
@@ -514,7 +514,7 @@ def _other_laws(engine, best, takes, left):
     for cause, taken in takes.items() if parts else ():
         effect = best.effects[cause]
         if cause in filters or effect.shows_with_time or effect.everyday or effect.is_constant \
-                or effect.stage == CROSS_AXIS:
+                or effect.mixes_axes:
             continue
         part = "odd" if engine.odd_share(best, cause) > 0.5 else "even"
         if taken < alike * parts.get(part, 0.0):
@@ -606,7 +606,7 @@ def _other_axes(engine, best, takes, left):
     rest = math.sqrt(share) * left.rms
     return {cause: f"{share:.0%} of what is left comes from the other axes: they come in otherwise"
             for cause, taken in takes.items()
-            if best.effects[cause].stage == CROSS_AXIS and taken < _ACROSS * rest}
+            if best.effects[cause].mixes_axes and taken < _ACROSS * rest}
 
 
 def _highest_hz(engine, best, share=_MOTION):

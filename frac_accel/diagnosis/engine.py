@@ -18,7 +18,6 @@ from ..identification.response.excitation import (
 )
 from ..model import is_link
 from ..model.effects import effect_of
-from ..model.effects.base import CROSS_AXIS
 from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
@@ -604,7 +603,7 @@ class Engine:
         what comes across from other axes or changes with time: nothing of another kind does that.
         """
         effect = fitted.effects[cause]
-        if effect.stage == CROSS_AXIS:
+        if effect.mixes_axes:
             kind = "across"
         elif effect.shows_with_time and not effect.adds:
             kind = "time_varying"

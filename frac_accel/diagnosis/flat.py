@@ -8,10 +8,10 @@ import numpy as np
 from ..model import SensorModel, is_link
 from ..model.core import Gain, Oscillator
 from ..model.effects import Effect, fault_of_reference, known_effects
-from ..model.parameters import parameter_fields
 from .doubts import own_delay_s
 from .engine import LONG, Engine
 from .gain import gain
+from .naming import as_open
 from .off_clock import is_clock
 from .search import acts_as_filter
 from .stretches import strongest_part
@@ -30,8 +30,6 @@ _SURELY_LESS, _NEARLY_AS_GOOD = 0.005, 1.02
 # the gain with a mount may then leave more power; and from its faster lag, and factor of one lag.
 _AS_A_MOUNT, _OF_A_MOUNT = 0.1, 1.1
 _AS_ITS_LAG, _OF_ONE_LAG = 0.2, 2.0
-# Standard uncertainties by which both must differ for a parameter to be as open as that.
-_OPEN_FROM = 2.0
 # Times what the diagnosis leaves in the end (RMS) up to which a rival describes as much.
 _AS_MUCH = 1.2
 # Variances of the noise within which a gain with one link describes a record as well.
@@ -217,22 +215,10 @@ def with_rival(judged, rival):
     faults = [fault_of_reference(effect) for effect in rival.effects.values()]
     other = {**rival.effects, **{fault.cause: fault for fault in faults if fault}}
     return dataclasses.replace(judged, findings=[
-        _as_open(finding, other[finding.cause], sorted(
+        as_open(finding, other[finding.cause], " and ".join(sorted(
             rival.effects.keys() - {finding.cause, finding.effect.mirrors}))
+            + " in place of the sensor's own resonance, which describes the record as well")
         if finding.cause in other else finding for finding in judged.findings])
-
-
-def _as_open(finding, other, beside):
-    std, words = dict(finding.std), []
-    for field in parameter_fields(type(finding.effect)):
-        name, here = field.name, getattr(finding.effect, field.name)
-        away = abs(getattr(other, name) - here) if name in std else 0.0
-        if away > _OPEN_FROM * std.get(name, np.inf):
-            std[name] = float(np.hypot(std[name], away / np.sqrt(3)))
-            words.append(f"{name} is {getattr(other, name):.4g} {field.metadata['unit']} with "
-                         f"{' and '.join(beside)} in place of the sensor's own resonance, which "
-                         "describes the record as well")
-    return dataclasses.replace(finding, std=std, evidence=[*finding.evidence, *words])
 
 
 def _with_a_link(engine, fitted):

@@ -9,7 +9,9 @@ from scipy.special import expit
 from ..errors import FracAccelError
 from ..model import is_link
 from ..model.effects import IDENTIFIED, fault_of_reference
-from ..model.effects.base import CROSS_AXIS, OFFSET
+from ..model.effects.base import OFFSET
+from ..model.parameters import parameter_fields
+from ..shown import listed
 from .courses import with_level
 from .doubts import (
     by_what_is_left,
@@ -23,6 +25,7 @@ from .engine import WEIGHS
 from .experiments import separating_experiment
 from .finding import Finding
 from .gain import gain
+from .search import acts_as_filter
 from .words import gain_words
 
 # Share of the baseline's excess power that may be left where causes are named.
@@ -38,6 +41,8 @@ _BROUGHT = 0.5
 _OTHERS = 0.25
 # The same of a filter beside which nothing else acts in its band.
 _STAYS = 0.05
+# Standard uncertainties by which two fits must differ for a parameter to be as open as that.
+_OPEN_FROM = 2.0
 # Standard uncertainties from the model's own value by which a parameter has moved.
 _MOVED = 5.0
 
@@ -55,6 +60,41 @@ def suspect(causes, margin, reason):
     """Causes that are not named, as a result has them."""
     return {"causes": sorted(causes), "margin": float(margin), "reason": reason,
             "experiment": separating_experiment(causes)}
+
+
+def as_open(finding, other, beside):
+    """A finding whose parameters are as uncertain as another fit of its cause makes them, `beside`
+    something else, in words: both ends of a uniform distribution (JCGM 100:2008, 4.3.7)."""
+    std, words = dict(finding.std), []
+    for field in parameter_fields(type(finding.effect)):
+        name, here = field.name, getattr(finding.effect, field.name)
+        away = abs(getattr(other, name) - here) if name in std else 0.0
+        if away > _OPEN_FROM * std.get(name, np.inf):
+            std[name] = float(np.hypot(std[name], away / np.sqrt(3)))
+            words.append(f"{name} is {getattr(other, name):.4g} {field.metadata['unit']} with "
+                         f"{beside}")
+    return dataclasses.replace(finding, std=std, evidence=[*finding.evidence, *words])
+
+
+def open_by_suspects(findings, fitted, wider):
+    """Findings, of which filters are as uncertain as others make them that have no name, in fits
+    that have these as well and leave less: each may do a part of what the other does."""
+    for fit in wider:
+        more = sorted(cause for cause in fit.causes - fitted.causes
+                      if acts_as_filter(fit.effects[cause]))
+        if more and fit.cost < fitted.cost:
+            beside = f"{listed(more)}, which may be there as well"
+            findings = [as_open(f, fit.effects[f.cause], beside)
+                        if acts_as_filter(f.effect) and _is_alike(f, fit.effects.get(f.cause))
+                        else f for f in findings]
+    return findings
+
+
+def _is_alike(finding, other):
+    """Whether another fit's effect is the same cause with other parameters, and nothing else."""
+    return other is not None and all(
+        abs(getattr(other, name) - getattr(finding.effect, name))
+        < _OTHERS * abs(getattr(finding.effect, name)) for name in finding.std)
 
 
 def sure(engine, best, findings, tied, left, fraction):
@@ -143,7 +183,7 @@ def _says_a_zero(engine, best, cause):
     """Whether a cause changes the zero, which begins anywhere, or brings a constant of other axes,
     such as gravity, which a zero may do as well."""
     effect = best.effects[cause]
-    if effect.stage != CROSS_AXIS:
+    if not effect.mixes_axes:
         return bool(effect.adds) and not effect.everyday
     brought = engine.added(best, cause)
     return abs(brought[engine.problem.used].mean()) >= _BROUGHT * engine.rms(brought)

@@ -62,7 +62,7 @@ UNLIKE = OtherAxes()
 
 
 def _crosses(effects):
-    return any(effect.stage == CROSS_AXIS for effect in effects.values())
+    return any(effect.mixes_axes for effect in effects.values())
 
 
 def is_of_all_if_alike(effect):
@@ -126,7 +126,7 @@ def with_unknown_turn(engine, fitted, finding):
     hidden = np.where(np.ptp(shown, axis=0) > 0, np.mean(shown - responses[p.used], axis=0), 0.0)
     shares = np.zeros(len(AXES))
     for each in p.axis_model(fitted.effects).effects:
-        if each.stage == CROSS_AXIS:
+        if each.mixes_axes:
             shares += each.share_of_axes(p.axis)
     turned = np.hypot(_of_a_turn(p, fitted, responses + hidden), shares[others] @ hidden)
     (name, std), = finding.std.items()

@@ -11,7 +11,7 @@ from ..errors import FracAccelError
 from ..identification.response.excitation import strongest_stretch
 from ..model import AXES, AxisModel, is_link
 from ..model.core.static_force import StaticForce
-from ..model.effects.base import CORE, CROSS_AXIS, DEAD_ZONE, GAIN, INTERFERENCE, Effect
+from ..model.effects.base import CORE, DEAD_ZONE, GAIN, INTERFERENCE, Effect
 from ..model.parameters import Scales, fixed_values, parameter_fields
 from ..signals.kept import kept
 from ..simulation import EDGE, AxisSimulator
@@ -260,30 +260,34 @@ class Problem:
             elif effect.stage == INTERFERENCE and self.in_band:
                 added = effect.live(self.rate).simulate(outputs[0], circumstances) - outputs[0]
                 outputs = [outputs[0] + (self.in_band.filtered(added) if added.any() else 0.0)]
-            elif effect.stage != CROSS_AXIS:
+            elif not effect.mixes_axes:
                 outputs = [effect.live(self.rate).simulate(values, circumstances)
                            for values in outputs]
             else:
-                shares = effect.share_of_axes(self.axis)
-                added = self._across(effects, shares) if across else 0.0
-                outputs = [shares[self.axis] * values + added for values in outputs]
+                own = effect.share_of_axes(self.axis)[self.axis]
+                added = self._across(effects, effect, model.gain) if across else 0.0
+                outputs = [own * values + added for values in outputs]
         return outputs[0]
 
-    def _across(self, effects, shares):
-        """What the other axes add; so little that few steps do.
+    def _across(self, effects, effect, gain):
+        """What an effect adds of the other axes where the own one has a constant gain; so little
+        that few steps do.
 
         These have the model in use, and of the causes only what is the same for all axes.
         """
         total = np.zeros(len(self.record))
         common = self.others.common(effects)
-        for other, share in enumerate(shares):
+        for other, share in enumerate(effect.share_of_axes(self.axis)):
             if other == self.axis or not share or not np.ptp(self.record.reference[:, other]):
                 continue
             model = self.axis_model(common, other)
-            before = tuple(e for e in model.effects if e.stage < CROSS_AXIS)
-            total += share * kept(
-                self._others, (other, before),
-                self.simulator(other, _STEPS_OF_SLOPES).simulate, AxisModel(model.core, before))
+            before = AxisModel(model.core, tuple(e for e in model.effects
+                                                 if e.stage < effect.stage))
+            gains = [before.gain] * len(AXES)
+            gains[self.axis] = gain
+            total += effect.behind_gains(gains).share_of_axes(self.axis)[other] * kept(
+                self._others, (other, before.effects),
+                self.simulator(other, _STEPS_OF_SLOPES).simulate, before)
         return total
 
     def change(self, effects, cause, effect, by_links=True):
@@ -309,7 +313,7 @@ class Problem:
                         added, self.simulator(self.axis).circumstances)
             return added
         before = {**linear, cause: effects[cause]} if cause in effects else linear
-        across = effect.stage == CROSS_AXIS or (
+        across = effect.mixes_axes or (
             by_links and is_link(effect) and self.others.have(effect))
         # beside a path, few steps show as much of what joins it as a first order is worth
         few = cause not in effects and any(map(follows_path, [effect, *linear.values()]))
@@ -330,7 +334,7 @@ class Problem:
     def _hardly_crossed(self, effects):
         """Whether the other axes add so little that a first order may leave out its change."""
         return all(np.abs(np.delete(effect.share_of_axes(self.axis), self.axis)).sum() < _CROSSED
-                   for effect in self.axis_model(effects).effects if effect.stage == CROSS_AXIS)
+                   for effect in self.axis_model(effects).effects if effect.mixes_axes)
 
     def force(self, model, effect, motion):
         """First-order response to a force along a motion."""
@@ -610,7 +614,7 @@ class Problem:
         steps = _STEPS_OF_SLOPES if forced or pathed else _STEPS
         before = point.simulated
         model = self.axis_model(point.effects)
-        crossed = any(effect.stage == CROSS_AXIS for effect in model.effects)
+        crossed = any(effect.mixes_axes for effect in model.effects)
         if forced and (crossed or not fit.rough):
             try:
                 before = self.simulate(point.effects, False, steps)
@@ -633,12 +637,12 @@ class Problem:
                 try:
                     new = self.replaced(point.effects, fit.unknowns, moved)
                     effect = new[unknown.cause]
-                    if forced and (effect.stage == CROSS_AXIS or not (
+                    if forced and (effect.mixes_axes or not (
                             fit.exact or effect.stage > CORE or acts_on_spring(effect))):
                         change = self.change(point.effects, unknown.cause, effect)
                     else:
                         # with forces, what comes across stays as it is: a few per cent of a column
-                        across = not forced and not (alone and effect.stage != CROSS_AXIS)
+                        across = not forced and not (alone and not effect.mixes_axes)
                         change = self.simulate(new, across, steps) \
                             - (before if across or forced else before_alone)
                     self._require_bound(change)

@@ -9,7 +9,6 @@ from ..errors import FracAccelError
 from ..model import is_link
 from ..model.core import Oscillator
 from ..model.effects import IDENTIFIED, known_effects
-from ..model.effects.base import CROSS_AXIS
 from ..model.effects.fit_starts import EquationOfMotion
 from ..model.parameters import fixed_values, parameter_fields
 from ..shown import several
@@ -640,7 +639,7 @@ def mixes_otherwise(fit, best):
     """Whether two sets differ by what mixes the axes, and by nothing else."""
     apart = [fits.effects[cause] for fits, other in ((fit, best), (best, fit))
              for cause in fits.causes - other.causes]
-    return bool(apart) and all(effect.stage == CROSS_AXIS for effect in apart)
+    return bool(apart) and all(effect.mixes_axes for effect in apart)
 
 
 def _goal(effects, cost):

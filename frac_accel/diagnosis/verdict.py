@@ -19,7 +19,7 @@ from .engine import OF_MOTION
 from .evidence import Evidence
 from .finding import Diagnosis
 from .gain import gain
-from .naming import constants_of, moved, remaining, rms_of, sure, suspect
+from .naming import constants_of, moved, open_by_suspects, remaining, rms_of, sure, suspect
 from .other_axes import fit_shares, with_unknown_turn
 from .own_core import in_own_core
 from .words import (
@@ -143,6 +143,7 @@ def _named(engine, likely, shown_by, back):
     findings, fitted, stds, more = sure(
         engine, best, [f for f in likely.findings if f.cause not in back], likely.tied, beside,
         fraction)
+    findings = open_by_suspects(findings, fitted, (best, likely.widest))
     complete = fitted.causes >= best.causes
     if not complete:
         fraction = remaining(engine, fitted, left.noise_rms)

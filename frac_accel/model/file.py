@@ -81,6 +81,13 @@ class AxisModel:
                      if type(effect).change_motion is not Effect.change_motion)
 
     @property
+    def gain(self):
+        """Constant gain of the core and the effects on it; of a core that states none, of these."""
+        return getattr(self.effective_core, "sensitivity", 1.0) * math.prod(
+            float(np.real(effect.transfer_function(np.zeros(1, complex))[0]))
+            for effect in self.effects if effect.is_constant)
+
+    @property
     def delay_s(self):
         """Sum of the pure delays [s]: the value stamped t belongs to t - delay_s."""
         return sum(effect.pure_delay_s() for effect in self.effects)
@@ -444,10 +451,10 @@ def _removed(stages, values, variance, circumstances):
 
 def _sample_stages(axes):
     """Pairs of effect class and its instances by axis index, in signal order."""
-    stages = {}
+    stages, gains = {}, [axis.gain for axis in axes]
     for index, axis in enumerate(axes):
         for effect in axis.effects:
-            stages.setdefault((effect.stage, effect.cause), {})[index] = effect
+            stages.setdefault((effect.stage, effect.cause), {})[index] = effect.behind_gains(gains)
     return [(type(next(iter(by_axis.values()))), by_axis)
             for _, by_axis in sorted(stages.items(), key=lambda item: item[0])]
 

@@ -317,7 +317,7 @@ def _find(axis, name, where):
             return 0.0, -np.inf, np.inf
         if part is None:
             raise ModelError(f"{where}: {name}: the model has no effect {owner}")
-        if part.stage > GAIN and name != "offset":
+        if (part.stage > GAIN or part.mixes_axes) and name != "offset":
             raise ModelError(f"{where}: {name}: the uncertainty of {owner} cannot be propagated, "
                              "only that of linear links and of the offset")
     for field in parameter_fields(type(part)):

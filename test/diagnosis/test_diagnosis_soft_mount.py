@@ -1,12 +1,16 @@
 """A soft mount, and no model: the sensor's own resonance would need a lead, which none has."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from sampled_pair import sampled_pair
 from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 
 from frac_accel import Samples, diagnose
+from frac_accel.diagnosis.finding import Finding
 from frac_accel.diagnosis.flat import Rival, with_rival
+from frac_accel.diagnosis.naming import open_by_suspects
 from frac_accel.model.effects import known_effects
 
 RATE, COUNT, FINER = 400.0, 12_000, 32
@@ -68,6 +72,29 @@ def test_a_delay_is_as_uncertain_as_what_describes_the_record_as_well_makes_it()
     assert same.std == named.std and same.evidence == named.evidence
     # what leaves more than the diagnosis in the end does not describe the record as well
     assert with_rival(found, rival._replace(rms=1.5 * left)) is found
+
+
+def test_a_filter_is_as_uncertain_as_one_that_is_only_suspected_makes_it():
+    """An average took the lag of a sensor's own with it, as the delay beside it had no name."""
+    causes = known_effects()
+
+    def fit(cost, *effects):
+        return SimpleNamespace(cost=cost, effects={e.cause: e for e in effects},
+                               causes={e.cause for e in effects})
+    average, turn = causes["linear_phase_filter"](16.2e-3, 1), causes["misalignment"](0.0, 1.0, 0.0)
+    findings = [Finding(average, {"length_s": 2e-6}, 1.0, [], [], None),
+                Finding(turn, {"pitch_deg": 0.01}, 1.0, [], [], None)]
+    fitted = fit(1.0, average, turn)
+    wider = fit(0.9, causes["linear_phase_filter"](15.9e-3, 1), causes["misalignment"](0.0, 1.1, 0.0),
+                causes["time_delay"](1e-4))
+    one, other = open_by_suspects(findings, fitted, [wider])
+    assert one.std["length_s"] == pytest.approx(0.3e-3 / np.sqrt(3), rel=1e-2)
+    assert one.evidence == ["length_s is 0.0159 s with time_delay, which may be there as well"]
+    assert other.std == {"pitch_deg": 0.01}
+    # what describes the record worse, or has another filter altogether, says nothing
+    assert open_by_suspects(findings, fitted, [fit(1.1, *wider.effects.values())]) == findings
+    assert open_by_suspects(findings, fitted, [fit(
+        0.9, causes["linear_phase_filter"](8e-3, 1), causes["time_delay"](4e-3))]) == findings
 
 
 def delayed_pair(rng, delay_s):

@@ -6,7 +6,7 @@ from scipy.signal import butter, hilbert, sosfiltfilt
 from scipy.spatial.transform import Rotation
 from second_set_bench import RATE, Multisine, model, samples, times
 
-from frac_accel import Corrector, simulate
+from frac_accel import Corrector, SensorModel, simulate
 from frac_accel.diagnosis import diagnose
 from frac_accel.model.effects.misalignment import Misalignment
 
@@ -136,3 +136,60 @@ def test_of_a_body_that_stands_on_end_one_angle_is_known_for_two(pitch):
     words = [turn.words_of_turn(1.5) for turn in turns]
     assert words[0] == words[1] and "± 1.5 degrees, is known" in words[0][0]
     assert Misalignment(roll, pitch / 2, yaw).words_of_turn(1.5) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_each_axis_has_its_gain_behind_the_turn(seed):
+    """Shares of other axes came with the own gain left out."""
+    rng, t, reference, _ = motion(40 + seed)
+    angles, gains, rate = rng.uniform(-8, 8, 3), rng.uniform(0.6, 1.4, 3), rng.uniform(0.01, 0.03)
+    turn = {"cause": "misalignment", **dict(zip(("roll_deg", "pitch_deg", "yaw_deg"),
+                                                map(float, angles)))}
+
+    def of_axes(*more):
+        return SensorModel.from_dict({**model().to_dict(), "axes": {
+            axis: {"effects": [{"cause": "sensitivity_error", "gain": float(gain)},
+                               *([{"cause": "gain_drift", "rate_per_s": float(rate)}]
+                                 if axis == "x" else []), *more]}
+            for axis, gain in zip("xyz", gains)}})
+    turned_first = simulate(of_axes(), turned(reference, *angles), RATE)
+    np.testing.assert_allclose(simulate(of_axes(turn), reference, RATE), turned_first, atol=1e-9)
+    made = samples(t, turned_first)
+    back = Corrector(of_axes(turn), RATE, noise_std=0.01).process(made.stamps_ns, made.values)
+    error = (back.values - reference[back.index])[300:-300]
+    assert np.std(error) < 0.02 * np.std(reference)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_turn_is_that_of_the_sensor_whatever_its_gain(seed):
+    """Of a gain of 0.85 the angles were 0.85 of what they are, by up to 400 standard
+    uncertainties."""
+    rng, t, reference, output = motion(50 + seed)
+    angles, gain = rng.uniform(1, 3, 3) * rng.choice([-1, 1], 3), rng.uniform(0.7, 0.9)
+    values = turned(output, *angles) * [gain, 1, 1] + 0.003 * rng.normal(size=(N, 3))
+    by_cause = {f.cause: f for f in found(t, reference, values).findings}
+    assert by_cause.keys() == {"sensitivity_error", "misalignment"}
+    assert abs(by_cause["sensitivity_error"].effect.gain - gain) \
+        < 4 * by_cause["sensitivity_error"].std["gain"]
+    turn = by_cause["misalignment"]
+    for name, angle in zip(("pitch_deg", "yaw_deg"), angles[1:]):
+        assert abs(getattr(turn.effect, name) - angle) < 4 * turn.std[name]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_gain_that_warms_acts_on_what_a_turn_shows_of_gravity(seed):
+    """A zero that changes with temperature was named beside it."""
+    rng, t, reference, _ = motion(60 + seed)
+    reference = reference + [0, 0, 9.81]
+    angles, coefficient = rng.uniform(1, 2, 3) * rng.choice([-1, 1], 3), rng.uniform(3e-3, 6e-3)
+    warm = 25 + 20 * np.sin(2 * np.pi * 0.4 * t / t[-1] + rng.uniform(0, 6))
+    values = simulate(model(), turned(reference, *angles), RATE)
+    values[:, 0] *= 1 + coefficient * (warm - 25)
+    values += 0.003 * rng.normal(size=values.shape)
+    pair = samples(t, reference), samples(t, values)
+    named = {f.cause: f for f in diagnose(
+        pair, model(), "x", temperature=(pair[1].stamps_ns, warm)).findings}
+    assert named.keys() - {"offset"} == {"temperature_sensitivity", "misalignment"}
+    warming = named["temperature_sensitivity"]
+    assert abs(warming.effect.coefficient_per_k - coefficient) \
+        < 4 * warming.std["coefficient_per_k"]

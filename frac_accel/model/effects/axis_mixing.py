@@ -2,8 +2,6 @@
 
 import numpy as np
 
-from .base import CROSS_AXIS
-
 # Share of its own axis of the reference from which on an axis does not follow another one.
 _OWN = 0.5
 
@@ -32,7 +30,7 @@ def turn_back(axes, axis):
     """
     matrix = np.eye(3)
     for effect in axes[axis].effects:
-        if effect.stage == CROSS_AXIS:
+        if effect.mixes_axes:
             matrix = np.stack([effect.share_of_axes(i) for i in range(3)]) @ matrix
     astray = matrix[axis, axis] < _OWN and np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6)
     return matrix.T if astray else None

@@ -7,7 +7,7 @@ import numpy as np
 from ..parameters import parameter
 from .axis_mixing import mix, mixing_matrix
 from .axis_turn import turn_of
-from .base import CROSS_AXIS, Effect
+from .base import TURN, Effect
 from .fit_starts import Start, finite
 
 _AXES = "xyz"
@@ -31,12 +31,12 @@ class Misalignment(Effect):
 
     :math:`R = R_z(\text{yaw}) R_y(\text{pitch}) R_x(\text{roll})` turns a vector's components in
     the sensor's axes into those in the reference's; the sensor says
-    :math:`R^T a_\text{reference}`. With all three axes alike, the turn acts on their outputs as it
-    does on the acceleration.
+    :math:`R^T a_\text{reference}`, each axis with its gain :math:`G`. With axes that are alike but
+    for that, the turn acts on their outputs :math:`G a` as :math:`G R^T G^{-1}`.
     """
 
     cause = "misalignment"
-    stage = CROSS_AXIS
+    stage = TURN
     explanation = ("The sensor is turned against the reference; by quarter turns, axes are "
                    "exchanged or have the opposite sign.")
     experiment = ("Record at rest in several positions: gravity shows the axes of both. A turn "
@@ -100,6 +100,12 @@ class Misalignment(Effect):
     def share_of_axes(self, axis):
         return self.rotation[:, axis]
 
+    def behind_gains(self, gains):
+        gains = tuple(map(float, gains))
+        if not all(gains) or len(set(gains)) == 1:
+            return self
+        return _BehindGains(self.roll_deg, self.pitch_deg, self.yaw_deg, gains)
+
     def with_other_axes(self, axis, shares):
         """The same turn but for one about the axis itself, which only the others see."""
         others = [(axis + 1) % 3, (axis + 2) % 3]
@@ -155,6 +161,16 @@ class Misalignment(Effect):
             starts.append(Start(
                 cls(*turn), tuple(cls(**{angle: _SMALL_DEG}) for angle in angles), "free"))
         return starts
+
+
+@dataclasses.dataclass(frozen=True)
+class _BehindGains(Misalignment):
+    """The turn as it mixes outputs of axes with constant gains."""
+
+    gains: tuple = (1.0, 1.0, 1.0)
+
+    def share_of_axes(self, axis):
+        return super().share_of_axes(axis) * self.gains[axis] / np.array(self.gains)
 
 
 # The angle that mixes two axes where it is small.
