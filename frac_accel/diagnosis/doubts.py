@@ -98,6 +98,8 @@ _EDGE = 0.95
 _PEAKED, _AT_PEAK = 0.1, 10.0
 # Times as dense as in the octaves beside its resonance that what is left must be there to be of it.
 _DENSER = 10.0
+# Times the end of what is compared up to which an average's corner is looked for, and frequencies.
+_FAR_BEYOND, _CORNERS = 8.0, 2049
 # Share of a core's pole within which a link's zero undoes it.
 _UNDOES = 0.1
 # Share of what is left around a mode's resonance without it from which it explains nothing there.
@@ -714,12 +716,24 @@ def _out_of_sight(engine, best):
     if all(entry.is_known for entry in engine.loose.values()):
         return {}
     for cause, effect in _filters(engine, best).items():
-        corners = np.abs(np.r_[effect.poles(), effect.zeros()]) / (2 * np.pi) \
-            if is_link(effect) and not 0 < _damping(effect) <= _RINGS else np.zeros(0)
-        if len(corners) and corners.min() > edge:
-            found[cause] = f"its corner, {corners.min():.3g} Hz, lies beyond what is compared " \
+        corner = _corner_hz(effect, edge) if is_link(effect) else 0.0
+        if corner > edge:
+            found[cause] = f"its corner, {corner:.3g} Hz, lies beyond what is compared " \
                            f"({edge:.3g} Hz): there many filters, and cores, do the same"
     return found
+
+
+def _corner_hz(effect, edge_hz):
+    """Lowest corner [Hz] of a link without a peak; of an average of the reference that has no
+    poles, where half the power is left; 0 of other links."""
+    turns = np.abs(np.r_[effect.poles(), effect.zeros()]) / (2 * np.pi)
+    if len(turns):
+        return 0.0 if 0 < _damping(effect) <= _RINGS else float(turns.min())
+    if not effect.of_reference:
+        return 0.0
+    frequency = np.linspace(0, _FAR_BEYOND * edge_hz, _CORNERS)
+    size = np.abs(np.log(np.abs(effect.transfer_function(2j * np.pi * frequency)))) > np.log(2) / 2
+    return float(frequency[np.argmax(size)]) if size.any() else np.inf
 
 
 def _of_other_axes(engine, best):

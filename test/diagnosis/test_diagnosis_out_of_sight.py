@@ -7,13 +7,16 @@ from rig.excitation import band_noise
 from rig.oscillator import integrate
 from rig.record import simulate_record
 from rig.sensor import Sensor
+from scipy.optimize import brentq
 from scipy.signal import butter, cont2discrete, lfilter, sosfilt
 from shaken import OVERSAMPLING, measured, shocks
 
 import frac_accel
 from frac_accel import SensorModel
+from frac_accel.diagnosis.doubts import _corner_hz
 from frac_accel.io.samples import Samples
 from frac_accel.model.core import Gain
+from frac_accel.model.effects import known_effects
 
 
 def random_motion(rng, rate, n, low_hz, high_hz):
@@ -129,3 +132,16 @@ def test_two_filters_above_the_motion_have_no_name(seed):
         SensorModel.from_dict({"schema": "frac_accel/sensor_model/1", "core": core}))
     assert not found.findings
     assert any("many filters do the same" in suspect["reason"] for suspect in found.suspects)
+
+
+@pytest.mark.parametrize("order", [1, 3, 16])
+def test_the_corner_of_an_average_of_the_reference_is_where_half_the_power_is_left(order):
+    """One of 96 Hz was named where 90 Hz were compared: with a delay, it did what a lag of the
+    reference does."""
+    length_s, edge_hz = 1.2e-3, 90.0
+    corner = brentq(lambda hz: np.sinc(length_s * hz)**(2 * order) - 0.5, 1.0, 0.9 / length_s)
+    average = known_effects()["reference_smoothing"](length_s, order)
+    assert _corner_hz(average, edge_hz) == pytest.approx(corner, abs=0.4)
+    assert _corner_hz(average, corner / 10) == np.inf
+    # of the sensor it has a delay besides, which tells it
+    assert _corner_hz(known_effects()["linear_phase_filter"](length_s, order), edge_hz) == 0.0

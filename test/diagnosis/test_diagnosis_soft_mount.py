@@ -85,8 +85,8 @@ def test_a_filter_is_as_uncertain_as_one_that_is_only_suspected_makes_it():
     findings = [Finding(average, {"length_s": 2e-6}, 1.0, [], [], None),
                 Finding(turn, {"pitch_deg": 0.01}, 1.0, [], [], None)]
     fitted = fit(1.0, average, turn)
-    wider = fit(0.9, causes["linear_phase_filter"](15.9e-3, 1), causes["misalignment"](0.0, 1.1, 0.0),
-                causes["time_delay"](1e-4))
+    wider = fit(0.9, causes["linear_phase_filter"](15.9e-3, 1), causes["time_delay"](1e-4),
+                causes["misalignment"](0.0, 1.1, 0.0))
     one, other = open_by_suspects(findings, fitted, [wider])
     assert one.std["length_s"] == pytest.approx(0.3e-3 / np.sqrt(3), rel=1e-2)
     assert one.evidence == ["length_s is 0.0159 s with time_delay, which may be there as well"]
