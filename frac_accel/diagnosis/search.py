@@ -208,7 +208,9 @@ class Search:
                     best = min([best_before, *(other.cost for other in trials.values())])
                     continue
                 best = min(best, trial.cost)
-            if trial is not self.fits.get(key) and trial.cost <= _BEHIND * best:
+            # beside a force or friction each order takes long: only of what may be the best
+            close = self._near(best) if is_nonlinear(trial) else _BEHIND * best
+            if trial is not self.fits.get(key) and trial.cost <= close:
                 trial = self._varied(trial)
                 best = min(best, trial.cost)
             goal = min(goal, self._near(trial.cost))
