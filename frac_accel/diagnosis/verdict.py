@@ -143,7 +143,9 @@ def _named(engine, likely, shown_by, back):
     findings, fitted, stds, more = sure(
         engine, best, [f for f in likely.findings if f.cause not in back], likely.tied, beside,
         fraction)
-    findings = open_by_suspects(findings, fitted, (best, likely.widest))
+    # a long record's widest set may be one of its part
+    wider = [fit for fit in (best, likely.widest) if fit.problem is fitted.problem]
+    findings = open_by_suspects(findings, fitted, wider)
     complete = fitted.causes >= best.causes
     if not complete:
         fraction = remaining(engine, fitted, left.noise_rms)
@@ -157,7 +159,7 @@ def _named(engine, likely, shown_by, back):
     findings = _without_mean_delay([
         *(with_unknown_turn(engine, fitted, finding) for finding in findings), *away,
         *(f for f in drifts if f.cause not in back),
-        *_shown(shown_by, fitted, (best, likely.widest))])
+        *_shown(shown_by, fitted, wider)])
     unnamed = sorted(fitted.causes - {f.cause for f in findings} - engine.search.base.keys())
     # what was in doubt in a part of the record, or beside something else, is no suspect any more
     suspects = [each for each in suspects
