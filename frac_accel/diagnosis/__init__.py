@@ -25,6 +25,7 @@ from ..record.orientation import Orientation, turned_away
 from ..record.sources import pair_of
 from ..simulation import AxisSimulator
 from .courses import begun_with, beside, course_of, is_a_law, is_worth_it, refined
+from .doubts import undone_mounts
 from .engine import Engine
 from .event import event, start
 from .finding import Diagnosis, Finding, insufficient
@@ -34,6 +35,7 @@ from .flat import (
     is_a_mount,
     links_beside_core,
     one_filter_instead,
+    own_resonance_instead,
     with_rival,
 )
 from .judgement import judge
@@ -218,6 +220,8 @@ def _beside_all_else(begin, engine, seed, record, engine_of):
     elif engine_of is not None:
         begin, engine, best, seed = _with_a_mount(begin, engine, best, seed, engine_of)
         begin, engine, best, seed = _with_a_filter(begin, engine, best, seed, engine_of)
+    if engine_of is not None:
+        begin, engine, best, seed = _with_own_resonance(begin, engine, best, seed, engine_of)
     begin, engine, best = _with_unlike_axes(begin, engine, best, seed)
     begin, engine, best = _with_a_course(begin, engine, best, seed)
     if engine.part is None:
@@ -378,6 +382,28 @@ def _with_a_filter(begin, engine, best, seed, engine_of):
     return own_begin, other, other.best, {
         cause: effect for cause, effect in other.best.effects.items()
         if cause not in other.search.base}
+
+
+def _with_own_resonance(begin, engine, best, seed, engine_of):
+    """Engine with an oscillator in the place of a gain, a mount and filters that undo the mount's
+    zero, what begins and seeds it, and its best set; those given where that is no leaner."""
+    p = engine.problem
+    for cause in undone_mounts(engine, best) if engine.part is None else ():
+        if p.limit.ends_search("no resonance of the sensor's own was tried in a mount's place"):
+            break
+        pole = best.effects[cause].poles()[0]
+        omega = float(abs(pole))
+        model = SensorModel(Oscillator(omega / (2 * np.pi), float(-pole.real) / omega,
+                                       sensitivity=p.baseline.axis(p.axis).core.sensitivity))
+        own_begin, other = _with_courses(engine_of(model, dict.fromkeys(_CORE, np.inf), {}),
+                                         engine, engine.search.courses)
+        found = own_resonance_instead(other, best)
+        if found is not None:
+            other.best = other.compete(other.search.prune(found, other.threshold))
+            return own_begin, other, other.best, {
+                cause: effect for cause, effect in other.best.effects.items()
+                if cause not in other.search.base}
+    return begin, engine, best, seed
 
 
 def _flat(engine, engine_of):

@@ -7,7 +7,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
-from ..model.core import Oscillator
+from ..model.core import Gain, Oscillator
 from ..model.effects.base import GAIN, OFFSET, Effect
 from .courses import with_level
 from .engine import LONG, WEIGHS
@@ -102,6 +102,9 @@ _DENSER = 10.0
 _FAR_BEYOND, _CORNERS = 8.0, 2049
 # Share of a core's pole within which a link's zero undoes it.
 _UNDOES = 0.1
+# Share of the lead of a mount's zero by which the lag of what undoes it may differ, and share of
+# the mount's frequency at which lags are those of slow motion.
+_UNDONE, _SLOW = 0.05, 1e-3
 # Share of what is left around a mode's resonance without it from which it explains nothing there.
 _NO_LESS = 0.9
 # Damping ratio above which a mode beside the sensor's own hardly rings, and below which a peak is
@@ -165,9 +168,11 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **gradual(engine, best, gains)}.items():
         doubts.setdefault(cause, words)
     for pair in cancelling(added):
-        # what begins or settles does so from a constant, which may be that of its start or its end
+        # what begins or settles does so from a constant, which may be that of its start or its end,
+        # and of a turned axis gravity comes with the motion across
         of_used = [added[cause][p.used] for cause in pair]
-        if any(best.effects[cause].counts_from_start for cause in pair) \
+        if any(best.effects[cause].counts_from_start or best.effects[cause].mixes_axes
+               for cause in pair) \
                 and any(np.std(values) < _CONSTANT * abs(np.mean(values)) for values in of_used):
             continue
         for cause, other in (pair, pair[::-1]):
@@ -179,6 +184,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **_of_other_axes(engine, best),
                          **_at_the_edge(engine, best), **_hardly_rings(engine, best),
                          **_out_of_sight(engine, best), **_undoes_the_core(engine, best),
+                         **_may_be_the_sensor(engine, best),
                          **_rings_otherwise(engine, best, takes, noise),
                          **_nothing_at_its_peak(engine, best),
                          **_corrections(engine, best, takes)}.items():
@@ -707,6 +713,39 @@ def _undoes_the_core(engine, best):
             for cause, effect in _filters(engine, best).items() if is_link(effect)
             for zero in np.atleast_1d(effect.zeros()) for pole in poles
             if abs(zero - pole) < _UNDOES * abs(pole)}
+
+
+def undone_mounts(engine, best):
+    """Leads [s] of the zeros of mounts, by cause, on a gain that was identified, where the other
+    filters together lag by just as much: the sensor's own resonance does the same without either.
+    """
+    p, found = engine.problem, {}
+    if not isinstance(p.baseline.axis(p.axis).core, Gain) or not _core_is_identified(engine):
+        return found
+    filters = _filters(engine, best)
+    for cause, effect in filters.items():
+        poles, zeros = np.atleast_1d(effect.poles()), np.atleast_1d(effect.zeros())
+        if not is_link(effect) or len(poles) != 2 or not np.all(poles.imag) or len(zeros) != 1 \
+                or not zeros[0]:
+            continue
+        lead_s = float(np.real(-1 / zeros[0]))
+        others = [other for name, other in filters.items() if name != cause]
+        lag_s = sum(_lag_s(other, _SLOW * abs(poles[0])) for other in others)
+        if others and abs(lag_s - lead_s) < _UNDONE * lead_s:
+            found[cause] = lead_s
+    return found
+
+
+def _may_be_the_sensor(engine, best):
+    return {cause: f"its zero leads by {lead_s:.3g} s, and the other filters lag by as much: the "
+                   "sensor's own resonance does the same without either"
+            for cause, lead_s in undone_mounts(engine, best).items()}
+
+
+def _lag_s(effect, omega):
+    """Time [s] by which motion of an angular frequency [rad/s] is late behind an effect."""
+    turn = np.angle(effect.transfer_function(np.array([1j * omega]))[0]) if is_link(effect) else 0.0
+    return effect.pure_delay_s() - float(turn) / omega
 
 
 def _out_of_sight(engine, best):

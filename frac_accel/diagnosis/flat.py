@@ -173,6 +173,17 @@ def one_filter_instead(engine, best, links):
                key=lambda fit: fit.cost, default=None)
 
 
+def own_resonance_instead(engine, best):
+    """The set of an oscillator's engine in the place of a gain's with a mount and filters, where it
+    describes the record as well with fewer parameters; or None."""
+    search = engine.search
+    fit = search.fit({**search.base, **{
+        cause: effect for cause, effect in best.effects.items()
+        if cause in search.candidates and not acts_as_filter(effect)}})
+    enough = (1 + _IN_PLACE_OF_BOTH / engine.problem.count) * best.cost
+    return fit if fit.varied < best.varied and fit.cost <= enough else None
+
+
 def _or_with_a_link(own, before, fits):
     """The fit that is better than an oscillator and as good as one with another link, if any; and
     the `Rival` that describes the record as well, if any."""

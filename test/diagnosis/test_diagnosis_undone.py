@@ -7,9 +7,10 @@ import pytest
 import scipy.signal as sig
 
 from frac_accel import SensorModel, diagnose
-from frac_accel.diagnosis.doubts import _undoes_the_core
+from frac_accel.diagnosis.doubts import _undoes_the_core, undone_mounts
 from frac_accel.diagnosis.engine import Engine
-from frac_accel.model.core import Oscillator
+from frac_accel.diagnosis.flat import own_resonance_instead
+from frac_accel.model.core import Gain, Oscillator
 from frac_accel.model.effects import known_effects
 from frac_accel.record import Record
 from frac_accel.record.sources import pair_of
@@ -76,3 +77,47 @@ def test_a_filter_of_third_order_is_named_beside_a_turn_that_was_not_known(seed)
     lag = named["low_pass_filter"].effect
     assert (lag.order, lag.family) == (3, "butterworth")
     assert lag.corner_hz == pytest.approx(corner, rel=0.01)
+
+
+def flat_or_own(sensor, motion, core):
+    """An engine with one core of unknown parameters, and what opens each fit."""
+    record = Record.of(*pair_of((motion, sensor), RATE, "x", "", ""), "x", None)
+    own = EFFECTS["sensitivity_error"](1.0) if isinstance(core, Gain) \
+        else EFFECTS["core_parameter_shift"](core.natural_frequency_hz, core.damping_ratio)
+    return Engine(record, 0, SensorModel(core), np.ones(N, bool), base={own.cause: own},
+                  candidates=["mounting_resonance", "time_delay"],
+                  loose={own.cause: SimpleNamespace(effect=own, is_known=False)})
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_mount_whose_lead_others_undo_is_the_sensor_itself(seed):
+    """With a turn under gravity, a sensor of 22.4 Hz was flat, on a mount of 22.4 Hz, behind an
+    average and a lead."""
+    rng = np.random.default_rng([9, seed])
+    frequency_hz, damping = rng.uniform(100, 300), rng.uniform(0.03, 0.1)
+    motion = sig.sosfiltfilt(sig.butter(4, 0.6 * frequency_hz, fs=RATE, output="sos"),
+                             rng.normal(size=N))
+    s = 2j * np.pi * np.fft.rfftfreq(N, 1 / RATE)
+    omega = 2 * np.pi * frequency_hz
+    answer = omega**2 / (s**2 + 2 * damping * omega * s + omega**2)
+    mount = EFFECTS["mounting_resonance"](frequency_hz, damping)
+
+    def found(response, delay_s):
+        sensor = np.fft.irfft(np.fft.rfft(motion) * response, N)
+        engine = flat_or_own(sensor + 1e-3 * sensor.std() * rng.normal(size=N), motion, Gain(1.0))
+        delay = EFFECTS["time_delay"](delay_s)
+        return engine, engine.search.fit({**engine.search.base, mount.cause: mount,
+                                          delay.cause: delay})
+    lead_s = 2 * damping / omega
+    engine, best = found(answer, lead_s)
+    assert undone_mounts(engine, best) == {mount.cause: pytest.approx(lead_s, rel=0.1)}
+    own = flat_or_own(engine.problem.measured, motion, Oscillator(frequency_hz, damping))
+    fit = own_resonance_instead(own, best)
+    assert fit.causes == {"core_parameter_shift"}
+    assert fit.effects["core_parameter_shift"].natural_frequency_hz \
+        == pytest.approx(frequency_hz, rel=1e-3)
+    # a mount with its lead, and late by something else, stays one
+    engine, best = found(answer * (1 + s * lead_s) * np.exp(-3 * lead_s * s), 3 * lead_s)
+    assert not undone_mounts(engine, best)
+    own = flat_or_own(engine.problem.measured, motion, Oscillator(frequency_hz, damping))
+    assert own_resonance_instead(own, best) is None

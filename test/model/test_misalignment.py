@@ -193,3 +193,18 @@ def test_a_gain_that_warms_acts_on_what_a_turn_shows_of_gravity(seed):
     warming = named["temperature_sensitivity"]
     assert abs(warming.effect.coefficient_per_k - coefficient) \
         < 4 * warming.std["coefficient_per_k"]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_zero_that_cancels_what_a_turn_shows_of_gravity_is_one(seed):
+    """Both were in doubt as causes that nearly cancel."""
+    rng, t, reference, _ = motion(70 + seed)
+    reference = reference + [0, 0, 9.81]
+    angles = rng.uniform(1.5, 2.5, 3) * rng.choice([-1, 1], 3)
+    values = simulate(model(), turned(reference, *angles), RATE)
+    zero = -rng.uniform(1.02, 1.1) * float(values[:, 0].mean())
+    values += [zero, 0, 0] + 0.003 * rng.normal(size=values.shape)
+    named = {f.cause: f for f in found(t, reference, values).findings}
+    assert named.keys() == {"offset", "misalignment"}
+    assert abs(named["offset"].effect.offset - zero) < 4 * named["offset"].std["offset"]
+    assert abs(named["misalignment"].effect.pitch_deg - angles[1]) < 0.05

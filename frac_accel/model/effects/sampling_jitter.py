@@ -11,10 +11,10 @@ from .residual_power import follows, law_likelihood, likelihood, slope_of, varia
 
 # Standard deviations by which the residual's power must follow the slope's, the logarithm of the
 # likelihood by which the slope must beat any other measure of the motion, and the share of the
-# residual's power that must be due to it.
+# residual's power that must be due to it, and may be: far more than all of it is another law.
 _SIGNIFICANT = 8.0
 _BETTER = 12.0
-_SHARE = 0.05
+_SHARE, _ALL = 0.05, 1.25
 # Periods of the motion over which its power is averaged: what follows that as well as the slope at
 # each instant is noise that grows with the motion.
 _PERIODS = (1, 4, 16)
@@ -69,7 +69,7 @@ class SamplingJitter(Effect):
             # what rounding makes of a small signal follows its slope as well
             factor -= max(variance_law(seen.rounding()[used], of_slope)[1], 0.0)
         share = factor * of_slope.mean() / np.mean(error**2)
-        if factor < _SIGNIFICANT * std or share < _SHARE:
+        if factor < _SIGNIFICANT * std or not _SHARE < share < _ALL:
             return None
         own = likelihood(error, noise + factor * of_slope)
         of_level = of_errors(level**2)
