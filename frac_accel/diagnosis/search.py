@@ -246,8 +246,9 @@ class Search:
                         continue
                     tried.add(kind)
                     try:
-                        others.append(self.problem.fit({**fit.effects, cause: other},
-                                                       goal=self._tied(fit.cost)))
+                        effects = {**fit.effects, cause: other}
+                        others.append(self.problem.fit(
+                            effects, goal=_goal(effects, self._tied(fit.cost))))
                     except FracAccelError:
                         continue
             close = self._tied(min(other.cost for other in [fit, *others]))
