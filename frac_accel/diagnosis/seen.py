@@ -67,9 +67,7 @@ class Seen:
     @functools.cached_property
     def repeated(self):
         """Share of the sensor's samples that say what the one before says, of those between whose
-        neighbours the signal moves on, by more than its lattice; 0 where it has no own ones."""
-        if "sensor" in self.record.resampled:
-            return 0.0
+        neighbours the signal moves on, by more than its lattice."""
         values = self.record.topics[1].values[:, self.axis] if self.record.topics \
             else self.measured
         across = np.abs(values[2:] - values[:-2])

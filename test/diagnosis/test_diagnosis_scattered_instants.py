@@ -153,3 +153,24 @@ def test_an_error_that_stays_behind_the_slope_where_that_is_large_is_no_scatter(
     named, _ = recognised(np.inf)
     assert named.rms_s == pytest.approx(0.02 / rate, rel=0.05)
     assert recognised(rng.uniform(2.2, 2.6)) is None
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_samples_that_say_the_last_value_again_scatter_no_instants(seed):
+    """Where the reference has another rate, what repeats was not looked at: 7 % of a sensor's."""
+    rng, rate, fine = np.random.default_rng([96, seed]), 80.0, 20
+    count = 12_000
+    motion = sosfiltfilt(butter(4, (0.5, 12), "band", fs=rate * fine, output="sos"),
+                         rng.normal(size=count * fine))
+    motion /= motion.std()
+    values = motion[::fine] + 0.002 * rng.normal(size=count)
+    again = 1 + np.flatnonzero(rng.random(count - 1) < 0.07)
+    values[again] = values[again - 1]
+    stamps = np.round(1e9 * np.arange(count) / rate)
+    places = np.arange(0, count - 1, rate / 43.1)
+    reference = np.interp(places * fine, np.arange(len(motion)), motion)
+    found = diagnose(tuple(
+        Samples.of(np.round(at).astype(np.int64), np.outer(each, [1.0, 0.0, 0.0]))
+        for at, each in ((1e9 * places / rate, reference), (stamps, values))),
+        SensorModel(Gain(1.0)))
+    assert "sampling_jitter" not in {finding.cause for finding in found.findings}
