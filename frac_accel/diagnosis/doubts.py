@@ -104,7 +104,7 @@ _FAR_BEYOND, _CORNERS = 8.0, 2049
 _UNDOES = 0.1
 # Share of the lead of a mount's zero by which the lag of what undoes it may differ, and share of
 # the mount's frequency at which lags are those of slow motion.
-_UNDONE, _SLOW = 0.05, 1e-3
+_AS_LATE, _SLOW = 0.05, 1e-3
 # Share of what is left around a mode's resonance without it from which it explains nothing there.
 _NO_LESS = 0.9
 # Damping ratio above which a mode beside the sensor's own hardly rings, and below which a peak is
@@ -731,7 +731,7 @@ def undone_mounts(engine, best):
         lead_s = float(np.real(-1 / zeros[0]))
         others = [other for name, other in filters.items() if name != cause]
         lag_s = sum(_lag_s(other, _SLOW * abs(poles[0])) for other in others)
-        if others and abs(lag_s - lead_s) < _UNDONE * lead_s:
+        if others and abs(lag_s - lead_s) < _AS_LATE * lead_s:
             found[cause] = lead_s
     return found
 

@@ -223,17 +223,18 @@ def test_reference_that_ends_half_way(files, tmp_path):
     assert [finding["cause"] for finding in said["findings"]] == ["mounting_resonance"]
 
 
-@pytest.mark.parametrize("lost, verdict", [
-    ((0.4, 0.8), "explained"), ((0.004, 0.9), "insufficient_data"),
-    ((0.5, 0.998), "insufficient_data")])
-def test_sensor_that_is_lost_for_a_long_time(files, tmp_path, lost, verdict):
+@pytest.mark.parametrize("lost", [(0.4, 0.8), (0.004, 0.9), (0.5, 0.998)])
+def test_sensor_that_is_lost_for_a_long_time(files, tmp_path, lost):
+    """It is judged by what is there, whether that is at one end or at both."""
     def part(samples):
         places = np.arange(len(samples.stamps_ns))
         return cut(samples, places[(places < lost[0] * len(places))
                                    | (places >= lost[1] * len(places))])
     said = diagnose(tmp_path, *changed(files, tmp_path, sensor=part))
     require_form(said)
-    assert said["verdict"] == verdict
+    assert said["verdict"] == "explained"
+    named = {finding["cause"] for finding in said["findings"]}
+    assert named - {"dropped_samples"} == {"mounting_resonance"}
 
 
 def test_stuck_values_are_no_cause(files, tmp_path):
