@@ -378,10 +378,7 @@ def _with_a_filter(begin, engine, best, seed, engine_of):
     found = one_filter_instead(other, best, links)
     if found is None:
         return begin, engine, best, seed
-    other.best = other.compete(other.search.prune(found, other.threshold))
-    return own_begin, other, other.best, {
-        cause: effect for cause, effect in other.best.effects.items()
-        if cause not in other.search.base}
+    return _from(own_begin, other, found)
 
 
 def _with_own_resonance(begin, engine, best, seed, engine_of):
@@ -399,11 +396,16 @@ def _with_own_resonance(begin, engine, best, seed, engine_of):
                                          engine, engine.search.courses)
         found = own_resonance_instead(other, best)
         if found is not None:
-            other.best = other.compete(other.search.prune(found, other.threshold))
-            return own_begin, other, other.best, {
-                cause: effect for cause, effect in other.best.effects.items()
-                if cause not in other.search.base}
+            return _from(own_begin, other, found)
     return begin, engine, best, seed
+
+
+def _from(begin, engine, found):
+    """What begins an engine, that, its best set from one that was found, and what seeds it."""
+    engine.best = engine.compete(engine.search.prune(found, engine.threshold))
+    return begin, engine, engine.best, {cause: effect for cause, effect in
+                                        engine.best.effects.items()
+                                        if cause not in engine.search.base}
 
 
 def _flat(engine, engine_of):

@@ -308,8 +308,6 @@ class Search:
         celsius = p.record.temperature_c
         delay, offset = (IDENTIFIED[name].cause for name in ("delay_s", "offset"))
         own = p.baseline.axis(p.axis).core
-        gains = [e.transfer_function(np.zeros(1, complex))[0].real for e in model.effects
-                 if e.is_constant]
         return View(p.rate, p.time, p.measured, fitted.simulated, fitted.residual, p.used,
                     model.effective_core, p.record.since_start_s,
                     sum(e.delay_s for e in model.effects if e.cause == delay),
@@ -323,7 +321,7 @@ class Search:
                     isinstance(own, Oscillator) and not any(
                         acts_on_spring(e) or follows_path(e) or (is_link(e) and not e.is_constant)
                         for e in model.effects),
-                    float(np.prod(gains)),
+                    model.constant_gain,
                     sum(e.offset for e in model.effects if e.cause == offset))
 
     @staticmethod

@@ -81,11 +81,15 @@ class AxisModel:
                      if type(effect).change_motion is not Effect.change_motion)
 
     @property
+    def constant_gain(self):
+        """Product of the effects that are a constant gain."""
+        return float(np.prod([effect.transfer_function(np.zeros(1, complex))[0].real
+                              for effect in self.effects if effect.is_constant]))
+
+    @property
     def gain(self):
-        """Constant gain of the core and the effects on it; of a core that states none, of these."""
-        return getattr(self.effective_core, "sensitivity", 1.0) * math.prod(
-            float(np.real(effect.transfer_function(np.zeros(1, complex))[0]))
-            for effect in self.effects if effect.is_constant)
+        """The same with that of the core; of one that states none, without."""
+        return getattr(self.effective_core, "sensitivity", 1.0) * self.constant_gain
 
     @property
     def delay_s(self):
