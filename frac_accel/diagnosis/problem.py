@@ -37,6 +37,10 @@ _LINES = 2049
 _UNBOUND = 1e6
 # Sum of the other axes' shares below which a first order leaves out how that changes.
 _CROSSED = 0.1
+# Share of what a step promises that it gains where derivatives leave nothing out that counts.
+_TRUE = 0.8, 1.25
+# Largest step, in scales, where those before have gained what they promised.
+_FARTHEST = 8.0
 # A gain of this share of one sample's error changes nothing that the data can tell.
 _SMALL_GAIN = 1e-2
 
@@ -108,6 +112,8 @@ class Fitted:
         Whether derivatives leave nothing out.
     trust : float
         How much of what it promised the last step has gained; 1 before the first.
+    reach : float
+        Largest step of an unknown that has a scale.
     """
 
     problem: "Problem"
@@ -118,6 +124,7 @@ class Fitted:
     rough: bool = False
     exact: bool = False
     trust: float = 1.0
+    reach: float = 1.0
 
     effects = property(lambda self: self.point.effects)
     cost = property(lambda self: self.point.cost)
@@ -515,10 +522,11 @@ class Problem:
         """
         spared = len({*map(acts_on_spring, here.effects.values())}) > 1
         low, high = np.array([(u.low, u.high) for u in here.unknowns]).T
+        most = np.array([1.0 if u.logarithmic else here.reach for u in here.unknowns])
         for _ in range(_TRIES):
             gram, slope = _normal(here)
-            step = _step(gram, slope, damping, np.maximum(low - here.theta, -1.0),
-                         np.minimum(high - here.theta, 1.0))
+            step = _step(gram, slope, damping, np.maximum(low - here.theta, -most),
+                         np.minimum(high - here.theta, most))
             promised = 2 * step @ slope - step @ gram @ step
             if promised < small or here.trust * promised < needed:
                 here.settled = promised < small and damping < 1e-2
@@ -532,6 +540,11 @@ class Problem:
                 went = theta - here.theta
                 trust = (here.cost - point.cost) / (2 * went @ slope - went @ gram @ went)
                 there = dataclasses.replace(here, point=point, theta=theta, trust=min(trust, 1.0))
+                if not _TRUE[0] < trust < _TRUE[1]:
+                    # derivatives that leave something out lead astray where that shows
+                    there.exact, there.reach = here.exact or spared, 1.0
+                elif np.any(np.abs(went) > 0.99 * most):
+                    there.reach = min(2 * here.reach, _FARTHEST)
                 return here, there, damping
             if spared and not here.exact:
                 here = dataclasses.replace(here, exact=True)
