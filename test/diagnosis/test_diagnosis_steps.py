@@ -91,6 +91,25 @@ def test_a_fit_that_can_reach_its_goal_is_not_ended_before(cause):
         assert short.cost <= goal, seed
 
 
+@pytest.mark.parametrize("seed", range(80, 86))
+def test_a_fit_beside_a_strong_law_comes_to_its_best(seed):
+    """Where derivatives that leave out how a law bends the core's own miss what a step gains, the
+    fit goes on with true ones; and farther than one scale at a time."""
+    cause, core = "quadratic_damping", "core_parameter_shift"
+    case = draw_case(seed, [cause, core], times_noise=100, excitation="band_noise")
+    reference, sensor, celsius = case.samples()
+    record = Record.of(reference, sensor, "x", celsius)
+    search = Engine(record, 0, case.model(), record.valid, candidates=[cause]).search
+    problem = search.problem
+    truth = {name: known_effects()[name](**values) for name, values in case.truth.items()}
+    best = problem.carried_on(problem.fit(truth, iterations=40))
+    shifted = search.fit({core: truth[core]})
+    begin = {**shifted.effects, cause: search.screen(shifted)[0][2]}
+    reached = problem.finished(problem.fit(begin, 4, rough=True))
+    # by less than one sample's error
+    assert reached.cost < best.cost * (1 + 1 / problem.count)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [700000, 41, 42, 43])
 def test_friction_that_an_identified_model_took_for_damping_is_no_hysteresis(seed):
