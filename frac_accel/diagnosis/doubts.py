@@ -14,7 +14,7 @@ from .engine import LONG, WEIGHS
 from .gradual import gradual
 from .in_bands import otherwise_in_bands
 from .names import cancelling, undetermined
-from .problem import Problem, acts_on_spring
+from .problem import WRONG_BY_STEPS, Problem, acts_on_spring
 from .search import acts_as_filter
 from .words import AS_NOISE
 
@@ -180,6 +180,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                                      "one cause that is not known")
     for cause, words in {**_parts_of_a_law(best, takes, added, left),
                          **_beside_a_strong_force(engine, best, takes, left, noise),
+                         **_within_steps(engine, best, takes, added),
                          **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
                          **_of_other_axes(engine, best),
                          **_at_the_edge(engine, best), **_hardly_rings(engine, best),
@@ -213,6 +214,15 @@ def _beside_a_strong_force(engine, best, takes, left, noise):
     return {cause: f"it takes {taken:.3g} RMS beside a strong force, where {left.rms:.3g} are left "
                    "that nothing shows to be noise" for cause, taken in takes.items()
             if is_link(best.effects[cause]) and taken < WEIGHS * left.rms}
+
+
+def _within_steps(engine, best, takes, added):
+    """Filters that take no more than the steps of the integration of a force may be wrong by."""
+    wrong = WRONG_BY_STEPS * math.hypot(*(
+        engine.rms(added[cause]) for cause in takes if acts_on_spring(best.effects[cause])))
+    return {cause: f"it takes {taken:.3g} RMS, which the simulation of so strong a force may be "
+                   "wrong by" for cause, taken in takes.items()
+            if taken < wrong and acts_as_filter(best.effects[cause])}
 
 
 def _as_slow(engine, best, added, takes):

@@ -27,9 +27,10 @@ _TRIES = 6
 _STEP = 1e-3
 # Share of the largest eigenvalue of the scaled products of derivatives that counts as none.
 _SINGULAR = 1e-10
-# Steps of a nonlinear core in each sampling interval: for the output (wrong by at most 3e-4 of what
-# the cause adds, where measured) and for its derivatives (ten times that, which bends no fit).
-_STEPS = 4
+# Steps of a nonlinear core in each sampling interval: for the output, share of what the cause adds
+# by which it is wrong at most, where measured, and steps for its derivatives (wrong by ten times
+# that, which bends no fit).
+_STEPS, WRONG_BY_STEPS = 4, 3e-4
 _STEPS_OF_SLOPES = 2
 # Frequencies over which a density is integrated.
 _LINES = 2049
@@ -39,6 +40,9 @@ _UNBOUND = 1e6
 _CROSSED = 0.1
 # Share of what a step promises that it gains where derivatives leave nothing out that counts.
 _TRUE = 0.8, 1.25
+# The same, differing from 1 by less than this, where derivatives serve another step of what
+# takes long to simulate.
+_AS_PROMISED = 0.1
 # Largest step, in scales, where those before have gained what they promised.
 _FARTHEST = 8.0
 # A gain of this share of one sample's error changes nothing that the data can tell.
@@ -114,6 +118,8 @@ class Fitted:
         How much of what it promised the last step has gained; 1 before the first.
     reach : float
         Largest step of an unknown that has a scale.
+    updated : bool
+        Whether its derivatives are those before its last step, with what that has shown.
     """
 
     problem: "Problem"
@@ -125,6 +131,7 @@ class Fitted:
     exact: bool = False
     trust: float = 1.0
     reach: float = 1.0
+    updated: bool = False
 
     effects = property(lambda self: self.point.effects)
     cost = property(lambda self: self.point.cost)
@@ -167,6 +174,17 @@ class Fitted:
     def jacobian(self):
         """Derivatives of the output by the unknowns, shape (n, p), clear of free motions."""
         return self.problem.slopes(self)
+
+    def update(self, before, step):
+        """Take the derivatives from a fit one step before, with what the step has shown (C. G.
+        Broyden, *Math. Comp.* 19 (1965) 577-593)."""
+        missed = before.residual - self.residual - before.jacobian @ step
+        self.jacobian = before.jacobian + np.outer(missed, step / (step @ step))
+        self.updated = True
+
+    def as_derived(self):
+        """The fit, its derivatives made anew where they were only updated."""
+        return dataclasses.replace(self, updated=False) if self.updated else self
 
 
 class Problem:
@@ -512,7 +530,7 @@ class Problem:
             here = there
             if gained < (here.cost if here.cost > hopeless else small):
                 break
-        return here
+        return here.as_derived()
 
     def _tried(self, here, damping, small, needed):
         """A fit; the same one step better, or None; and the damping that the step took.
@@ -520,7 +538,9 @@ class Problem:
         There is none where it promises less than a `small` gain, or, as far as such promises can
         be trusted, less than the `needed` one.
         """
-        spared = len({*map(acts_on_spring, here.effects.values())}) > 1
+        forces = {*map(acts_on_spring, here.effects.values())}
+        spared, costly = len(forces) > 1, True in forces or any(
+            map(follows_path, here.effects.values()))
         low, high = np.array([(u.low, u.high) for u in here.unknowns]).T
         most = np.array([1.0 if u.logarithmic else here.reach for u in here.unknowns])
         for _ in range(_TRIES):
@@ -528,6 +548,9 @@ class Problem:
             step = _step(gram, slope, damping, np.maximum(low - here.theta, -most),
                          np.minimum(high - here.theta, most))
             promised = 2 * step @ slope - step @ gram @ step
+            if promised < small and here.updated:
+                here = here.as_derived()
+                continue
             if promised < small or here.trust * promised < needed:
                 here.settled = promised < small and damping < 1e-2
                 break
@@ -539,13 +562,19 @@ class Problem:
             if point is not None and point.cost < here.cost:
                 went = theta - here.theta
                 trust = (here.cost - point.cost) / (2 * went @ slope - went @ gram @ went)
-                there = dataclasses.replace(here, point=point, theta=theta, trust=min(trust, 1.0))
+                there = dataclasses.replace(here, point=point, theta=theta, trust=min(trust, 1.0),
+                                            updated=False)
+                if costly and abs(trust - 1) < _AS_PROMISED:
+                    there.update(here, went)
                 if not _TRUE[0] < trust < _TRUE[1]:
                     # derivatives that leave something out lead astray where that shows
                     there.exact, there.reach = here.exact or spared, 1.0
                 elif np.any(np.abs(went) > 0.99 * most):
                     there.reach = min(2 * here.reach, _FARTHEST)
                 return here, there, damping
+            if here.updated:
+                here = here.as_derived()
+                continue
             if spared and not here.exact:
                 here = dataclasses.replace(here, exact=True)
                 continue

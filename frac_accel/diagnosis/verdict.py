@@ -228,7 +228,7 @@ def _described(engine, named, likely):
     described = _by_curves(engine, fitted, account.after, named_causes)
     wider, known = None, {}
     for each in {each.causes: each for each in (likely.widest, likely.best)}.values():
-        found = _kept(engine, named, each, account.after)
+        found = _kept(engine, named, each, account.after, likely.tied)
         if found is None:
             continue
         fit, stds, error = found
@@ -470,16 +470,17 @@ def _by_curves(engine, fitted, after, named):
                   output if described else None)
 
 
-def _kept(engine, named, widest, after):
-    """Fit of a set with causes that are only suspected, of linear ones and of such as change along
-    the record or with temperature, where it predicts held-out data clearly better than all else
-    that describes them (`after`), its standard uncertainties and its held-out error; or None."""
+def _kept(engine, named, widest, after, tied):
+    """Fit of a set with causes that are only suspected, of linear ones, of such as change along the
+    record or with temperature, and of those that another one equals (`tied`), where it predicts
+    held-out data clearly better than all else that describes them (`after`), its standard
+    uncertainties and its held-out error; or None."""
     p, rest, fitted = engine.problem, engine.held_out_rows, named.fitted
     more = {cause: effect for cause, effect in widest.effects.items()
             if cause not in fitted.causes and (is_link(effect) or effect.pure_delay_s()
                                                or effect.is_constant or effect.restates_core
                                                or effect.counts_from_start
-                                               or effect.needs_temperature)}
+                                               or effect.needs_temperature or cause in tied)}
     if not more or p.limit.ends_judging("what is only suspected was not kept as a description"):
         return None
     slow = [effect for effect in {**more, **fitted.effects}.values() if effect.acts_on_slow_motion]
