@@ -47,6 +47,9 @@ def undetermined(effect, unknowns, theta, stds, core, duration_s):
         null = null_value(effect, unknown.name, core)
         if null is not None and np.isfinite(null):
             moved.append(abs(value - null) > _DETERMINED * std)
+    special = special_case(effect, stds, core)
+    if special:
+        return special
     # one that has no such value, as an instant, does not tell that anything happens
     if moved and not any(moved):
         return "no parameter differs from the value that changes nothing"

@@ -10,7 +10,7 @@ from ..errors import FracAccelError
 from ..model import is_link
 from ..model.effects import IDENTIFIED, fault_of_reference
 from ..model.effects.base import OFFSET
-from ..model.parameters import parameter_fields
+from ..model.parameters import fixed_values, parameter_fields
 from ..shown import listed
 from .courses import with_level
 from .doubts import (
@@ -88,6 +88,25 @@ def open_by_suspects(findings, fitted, wider):
                         if acts_as_filter(f.effect) and _is_alike(f, fit.effects.get(f.cause))
                         else f for f in findings]
     return findings
+
+
+def open_by_one_suspect(engine, findings, fitted, suspects):
+    """Findings as uncertain as one suspect more makes them, where that describes the record clearly
+    better: whatever it is that it stands for has no name, but bends what has one."""
+    known = {cause for each in suspects for cause in each["causes"]}
+    wider = min((fit for fit in engine.search.fits.values()
+                 if fit.problem is fitted.problem and not fit.rough
+                 and fit.causes > fitted.causes and len(fit.causes) == len(fitted.causes) + 1
+                 and fit.causes - fitted.causes <= known
+                 and fitted.cost - fit.cost > engine.threshold(fit)),
+                key=lambda fit: fit.cost, default=None)
+    if wider is None:
+        return findings
+    beside = f"{listed(sorted(wider.causes - fitted.causes))}, which may be there as well"
+    return [as_open(f, wider.effects[f.cause], beside)
+            if f.cause in fitted.causes and f.effect == fitted.effects[f.cause]
+            and fixed_values(f.effect) == fixed_values(wider.effects[f.cause]) else f
+            for f in findings]
 
 
 def _is_alike(finding, other):

@@ -19,7 +19,16 @@ from .engine import OF_MOTION
 from .evidence import Evidence
 from .finding import Diagnosis
 from .gain import gain
-from .naming import constants_of, moved, open_by_suspects, remaining, rms_of, sure, suspect
+from .naming import (
+    constants_of,
+    moved,
+    open_by_one_suspect,
+    open_by_suspects,
+    remaining,
+    rms_of,
+    sure,
+    suspect,
+)
 from .other_axes import fit_shares, with_unknown_turn
 from .own_core import in_own_core
 from .words import (
@@ -145,7 +154,8 @@ def _named(engine, likely, shown_by, back):
         fraction)
     # a long record's widest set may be one of its part
     wider = [fit for fit in (best, likely.widest) if fit.problem is fitted.problem]
-    findings = open_by_suspects(findings, fitted, wider)
+    findings = open_by_one_suspect(engine, open_by_suspects(findings, fitted, wider), fitted,
+                                   [*likely.suspects, *more])
     complete = fitted.causes >= best.causes
     if not complete:
         fraction = remaining(engine, fitted, left.noise_rms)

@@ -10,7 +10,7 @@ from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 from frac_accel import Samples, diagnose
 from frac_accel.diagnosis.finding import Finding
 from frac_accel.diagnosis.flat import Rival, with_rival
-from frac_accel.diagnosis.naming import open_by_suspects
+from frac_accel.diagnosis.naming import open_by_one_suspect, open_by_suspects
 from frac_accel.model.effects import known_effects
 
 RATE, COUNT, FINER = 400.0, 12_000, 32
@@ -95,6 +95,36 @@ def test_a_filter_is_as_uncertain_as_one_that_is_only_suspected_makes_it():
     assert open_by_suspects(findings, fitted, [fit(1.1, *wider.effects.values())]) == findings
     assert open_by_suspects(findings, fitted, [fit(
         0.9, causes["linear_phase_filter"](8e-3, 1), causes["time_delay"](4e-3))]) == findings
+
+
+def test_a_law_is_as_uncertain_as_a_delay_without_a_name_makes_it():
+    """A second resonance was 28 standard uncertainties off beside a lag that the reference's noise
+    drowned: with that, the record is described clearly better."""
+    causes, problem = known_effects(), object()
+
+    def fit(cost, *effects, rough=False):
+        return SimpleNamespace(cost=cost, effects={e.cause: e for e in effects}, rough=rough,
+                               causes=frozenset(e.cause for e in effects), problem=problem)
+    loop, delay = causes["hysteresis"](0.078, 1.2, 2.0), causes["time_delay"](1e-4)
+    findings = [Finding(loop, {"strength": 1e-3, "beta": 0.03, "gamma": 0.08}, 1.0, [], [], None)]
+    fitted = fit(1.0, loop)
+    better = fit(0.9, causes["hysteresis"](0.0775, 1.0, 2.4), delay)
+    suspects = [{"causes": ["time_delay"]}]
+
+    def told(*fits, suspects=suspects):
+        engine = SimpleNamespace(search=SimpleNamespace(fits=dict(enumerate([fitted, *fits]))),
+                                 threshold=lambda fit: 0.05)
+        return open_by_one_suspect(engine, findings, fitted, suspects)
+    one, = told(better)
+    assert one.std["beta"] == pytest.approx(np.hypot(0.03, 0.2 / np.sqrt(3)))
+    assert one.std["gamma"] == pytest.approx(np.hypot(0.08, 0.4 / np.sqrt(3)))
+    assert one.std["strength"] == 1e-3
+    assert len(one.evidence) == 2 and "time_delay, which may be there as well" in one.evidence[0]
+    # what is hardly better, not carried to its end, or has more than one suspect, says nothing
+    assert told(fit(0.96, *better.effects.values())) == findings
+    assert told(fit(0.9, *better.effects.values(), rough=True)) == findings
+    assert told(fit(0.9, *better.effects.values(), causes["offset"](0.1))) == findings
+    assert told(better, suspects=[]) == findings
 
 
 def delayed_pair(rng, delay_s):

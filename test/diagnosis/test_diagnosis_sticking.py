@@ -7,6 +7,9 @@ from rig.record import simulate_record
 from rig.sensor import Sensor
 
 from frac_accel import Samples, SensorModel, diagnose
+from frac_accel.diagnosis.names import undetermined
+from frac_accel.model.core import Oscillator
+from frac_accel.model.effects import known_effects
 
 CORE = {"type": "oscillator", "damping_order": 1.0, "sensitivity": 1.0}
 
@@ -28,3 +31,13 @@ def test_friction_beside_a_lag_in_slow_waves_is_named(seed):
     sizes = {f.cause: f.effect for f in found.findings}
     assert sizes["coulomb_friction"].level == pytest.approx(level, rel=0.02)
     assert sizes["low_pass_lag"].corner_hz == pytest.approx(corner_hz, rel=0.01)
+
+
+@pytest.mark.parametrize("beta, words", [(0.0, "beta is compatible with 0"), (0.1, None)])
+def test_a_loop_without_what_opens_it_is_none(beta, words):
+    """Such a spring is harder, and nothing else: a natural frequency that had moved by 0.1 % was
+    named hysteresis, beta 0.00000 +- 0.00010."""
+    effect = known_effects()["hysteresis"](0.0021, beta, 0.0024)
+    told = undetermined(effect, [], [], {"strength": 4e-5, "beta": 1e-4, "gamma": 1.6e-3},
+                        Oscillator(21.37, 0.051), 94.0)
+    assert told is words if words is None else told.startswith(words)

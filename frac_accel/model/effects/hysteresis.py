@@ -23,12 +23,14 @@ class Hysteresis(Effect):
 
     cause = "hysteresis"
     stage = CORE
+    # without it there is no loop: a spring of another stiffness, or a bent one
+    nested = ("beta",)
     explanation = "The spring's force depends on its path, so that it takes another way back."
     experiment = ("Drive one slow sine at several levels: output over acceleration is a loop, "
                   "which stays open however slow.")
 
     strength: float = parameter("1", scale=0.1, null=0.0)
-    beta: float = parameter("1/(output units)", scale="per_level", minimum=0)
+    beta: float = parameter("1/(output units)", scale="per_level", minimum=0, null=0.0)
     gamma: float = parameter("1/(output units)", scale="per_level")
 
     def change_core(self, core):
