@@ -1,5 +1,7 @@
 """Dry friction of a mass that moves so slowly that it sticks at each turn: it is no play."""
 
+from unittest import mock
+
 import numpy as np
 import pytest
 from rig.excitation import band_noise
@@ -7,6 +9,7 @@ from rig.record import simulate_record
 from rig.sensor import Sensor
 
 from frac_accel import Samples, SensorModel, diagnose
+from frac_accel.diagnosis.engine import Engine
 from frac_accel.diagnosis.names import undetermined
 from frac_accel.model.core import Oscillator
 from frac_accel.model.effects import known_effects
@@ -41,3 +44,30 @@ def test_a_loop_without_what_opens_it_is_none(beta, words):
     told = undetermined(effect, [], [], {"strength": 4e-5, "beta": 1e-4, "gamma": 1.6e-3},
                         Oscillator(21.37, 0.051), 94.0)
     assert told is words if words is None else told.startswith(words)
+
+
+def test_of_two_that_explain_as_much_the_model_keeps_one_without_a_name():
+    """Far below its resonance a sensor with dry friction plays: which it is no record tells, and
+    the corrected signal needs either."""
+    rng = np.random.default_rng([29, 2])
+    core = {**CORE, "natural_frequency_hz": rng.uniform(1500, 2500),
+            "damping_ratio": rng.uniform(0.4, 0.7)}
+    record = simulate_record(
+        Sensor(core, {"coulomb_friction": {"level": rng.uniform(0.03, 0.08)},
+                      "gain_drift": {"rate_per_s": -6e-4}}),
+        band_noise(rng, 300.0, 30.0, (2, 60)), rng, snr_db=48.0)
+    all_rivals = Engine.rivals
+
+    def rivals(engine, best, cause, *more):
+        if cause != "coulomb_friction":
+            return all_rivals(engine, best, cause, *more)
+        return [(0.0, best.causes - {cause} | {"backlash"})]
+    with mock.patch.object(Engine, "rivals", rivals):
+        found = diagnose((Samples.of(record.stamps_ns, record.reference),
+                          Samples.of(record.sensor_stamps_ns, record.sensor)),
+                         SensorModel.from_dict({"schema": "frac_accel/sensor_model/1",
+                                                "core": core}))
+    assert "coulomb_friction" not in {f.cause for f in found.findings}
+    assert ["backlash", "coulomb_friction"] in [each["causes"] for each in found.suspects]
+    assert "keeps coulomb_friction" in found.reason
+    assert found.extended["nrmse"] < 0.1 * found.baseline["nrmse"]
