@@ -108,7 +108,7 @@ def test_what_a_free_motion_describes_is_in_no_model_file(is_written, monkeypatc
         held_out_rows=np.arange(4000) % 1000 > 700, learnt=lambda fit: fit,
         search=SimpleNamespace(fit=lambda effects: wider, to_its_best=lambda fit: fit),
         hollow=lambda fit: False, uncertainties=lambda fit: {})
-    kept = _kept(engine, SimpleNamespace(fitted=fitted, findings=[]), wider, measured.std())
+    kept = _kept(engine, SimpleNamespace(fitted=fitted, findings=[]), wider, measured.std(), {})
     assert (kept is not None) == is_written
 
 
