@@ -80,11 +80,10 @@ def open_by_suspects(findings, fitted, wider):
     """Findings, of which filters are as uncertain as others make them that have no name, in fits
     that have these as well and leave less: each may do a part of what the other does."""
     for fit in wider:
-        more = sorted(cause for cause in fit.causes - fitted.causes
-                      if acts_as_filter(fit.effects[cause]))
+        more = [cause for cause in fit.causes - fitted.causes
+                if acts_as_filter(fit.effects[cause])]
         if more and fit.cost < fitted.cost:
-            beside = f"{listed(more)}, which may be there as well"
-            findings = [as_open(f, fit.effects[f.cause], beside)
+            findings = [as_open(f, fit.effects[f.cause], _as_well(more))
                         if acts_as_filter(f.effect) and _is_alike(f, fit.effects.get(f.cause))
                         else f for f in findings]
     return findings
@@ -93,20 +92,21 @@ def open_by_suspects(findings, fitted, wider):
 def open_by_one_suspect(engine, findings, fitted, suspects):
     """Findings as uncertain as one suspect more makes them, where that describes the record clearly
     better: whatever it is that it stands for has no name, but bends what has one."""
-    known = {cause for each in suspects for cause in each["causes"]}
-    wider = min((fit for fit in engine.search.fits.values()
-                 if fit.problem is fitted.problem and not fit.rough
-                 and fit.causes > fitted.causes and len(fit.causes) == len(fitted.causes) + 1
-                 and fit.causes - fitted.causes <= known
+    known = {cause for each in suspects for cause in each["causes"]} - fitted.causes
+    beside = [engine.search.fits.get(fitted.causes | {cause}) for cause in sorted(known)]
+    wider = min((fit for fit in beside if fit and fit.problem is fitted.problem and not fit.rough
                  and fitted.cost - fit.cost > engine.threshold(fit)),
                 key=lambda fit: fit.cost, default=None)
     if wider is None:
         return findings
-    beside = f"{listed(sorted(wider.causes - fitted.causes))}, which may be there as well"
-    return [as_open(f, wider.effects[f.cause], beside)
+    return [as_open(f, wider.effects[f.cause], _as_well(wider.causes - fitted.causes))
             if f.cause in fitted.causes and f.effect == fitted.effects[f.cause]
             and fixed_values(f.effect) == fixed_values(wider.effects[f.cause]) else f
             for f in findings]
+
+
+def _as_well(causes):
+    return f"{listed(sorted(causes))}, which may be there as well"
 
 
 def _is_alike(finding, other):

@@ -112,8 +112,9 @@ def test_a_law_is_as_uncertain_as_a_delay_without_a_name_makes_it():
     suspects = [{"causes": ["time_delay"]}]
 
     def told(*fits, suspects=suspects):
-        engine = SimpleNamespace(search=SimpleNamespace(fits=dict(enumerate([fitted, *fits]))),
-                                 threshold=lambda fit: 0.05)
+        engine = SimpleNamespace(
+            search=SimpleNamespace(fits={fit.causes: fit for fit in (fitted, *fits)}),
+            threshold=lambda fit: 0.05)
         return open_by_one_suspect(engine, findings, fitted, suspects)
     one, = told(better)
     assert one.std["beta"] == pytest.approx(np.hypot(0.03, 0.2 / np.sqrt(3)))

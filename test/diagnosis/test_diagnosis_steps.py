@@ -68,7 +68,7 @@ def test_derivatives_beside_a_force_are_those_of_a_finer_simulation(cause):
         shift[i] = 3e-3
         central = (output(fit.theta + shift) - output(fit.theta - shift)) / 6e-3
         central = problem.clear(central, fit.free)
-        # a core's parameter beside a force is spared until a step is refused
+        # a core's parameter beside a force is spared until a step shows it
         for kind in [exact] + [fit] * (unknown.cause != "core_parameter_shift"):
             column = problem.clear(kind.jacobian[:, i], fit.free)
             assert np.std(column - central) < 0.05 * np.std(central), (unknown, kind.exact)
