@@ -22,6 +22,9 @@ _FAR = 8.0
 # The same of what the neighbours do not say: by so much the reference must stand out, by as many
 # times as much as the sensor, and as the reference itself does beside, and the sensor at most.
 _JUMPS, _TIMES, _QUIET = 6.0, 3.0, 5.0
+# Share of the power that the sensor does not show of the reference which must go with what the
+# reference has done alone: what else a sensor does after a jolt, as to ring on, is no such fault.
+_MISSED = 0.7
 # Samples up to which what is far out is one event, around it where the sensor must be quiet, and
 # beside it where the reference shows what is usual.
 _TOGETHER, _AROUND, _BESIDE = 16, 8, 50
@@ -50,7 +53,9 @@ def glitches(reference, sensor, valid):
     -----
     A motion shows on both sides. Where neither is what a filter makes of the other, one of them is
     wrong: the one that is not what its neighbours on both sides say (best linear interpolation,
-    A. Papoulis, *Signal Analysis* (1977)), while the other goes on as before.
+    A. Papoulis, *Signal Analysis* (1977)), while the other goes on as before. What the sensor lacks
+    then is what the filter makes of the fault alone. A jolt that a slow sensor smooths, and after
+    which it rings for longer than the filter, lacks that of nothing.
     """
     if np.count_nonzero(valid) < 8 * (2 * _REACH + 1):
         return []
@@ -66,12 +71,14 @@ def glitches(reference, sensor, valid):
     # what is far beyond all else must not bend the filters by which it is found
     tame = [np.clip(values, -_WILD, _WILD) for values in pair]
     try:
-        back, there = (pair[to] - _filtered(tame[1 - to], tame[to], pair[1 - to]) for to in (0, 1))
+        taps = [_taps(tame[1 - to], tame[to], range(-_REACH, _REACH + 1)) for to in (0, 1)]
+        back, there = (pair[to] - _centred(pair[1 - to], taps[to]) for to in (0, 1))
         alone = [_unsaid(values, of) for values, of in zip(pair, tame)]
     except LinAlgError:
         return []
     if _spread(back[valid]) > _ALIKE:
         return []
+    fault, missed = back, there
     back, there, own, other = (_in_spreads(values, valid) for values in (back, there, *alone))
     far = np.flatnonzero(valid & (back > _FAR))
     if not len(far):
@@ -89,10 +96,21 @@ def glitches(reference, sensor, valid):
         quiet = float(np.max(other[around]))
         if np.max(own[around]) > max(_JUMPS, _TIMES * quiet,
                                      _TIMES * np.max(as_usual, initial=0.0)) \
-                and quiet < _QUIET and np.max(there[around]) > _FAR and valid[around].all():
+                and quiet < _QUIET and np.max(there[around]) > _FAR and valid[around].all() \
+                and _goes_with(missed, fault, rows, taps[1]):
             found.append(rows)
     count = sum(rows.stop - rows.start for rows in found)
     return found if count <= _RARE * len(valid) else []
+
+
+def _goes_with(missed, fault, rows, taps):
+    """Whether what the sensor does not show of the reference is what a filter makes of a fault in
+    these rows."""
+    around = slice(max(rows.start - _REACH, 0), rows.stop + _REACH)
+    alone = np.zeros(around.stop - around.start)
+    alone[rows.start - around.start:rows.stop - around.start] = fault[rows]
+    seen = missed[around]
+    return np.sum((seen + _centred(alone, taps)[:len(seen)])**2) < (1 - _MISSED) * np.sum(seen**2)
 
 
 def is_cut_off(values, there):
@@ -148,11 +166,6 @@ def _own(values, count):
 def _taps(values, target, lags):
     """Filter of least squares from one signal to another, at successive lags."""
     return solve_toeplitz(_own(values, len(lags)), _shared(values, target, lags))
-
-
-def _filtered(values, target, of):
-    """What the filter from `values` to `target` makes of a signal, both sides of a sample."""
-    return _centred(of, _taps(values, target, range(-_REACH, _REACH + 1)))
 
 
 def _unsaid(values, tame):

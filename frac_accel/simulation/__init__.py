@@ -305,7 +305,7 @@ class AxisSimulator:
         count = int(max(self._n - 1 - delay_s * self._rate, self._n)) + _BEYOND
         self._prepared(delay_s)
         links = (core, *(effect for effect in model.dynamics[1:] if effect.stage < CORE))
-        load = self._level * core.sensitivity if force else 0.0
+        load = self._level * core.sensitivity if force and not _lost_slow(links) else 0.0
         orders = nonlinear_motion.derivatives_needed(force) + 1 if natural else 1
         known_by = links, natural, orders, steps, count
         motion, modes = kept(self._motions, known_by, self._core_motion, *known_by, most=1)
@@ -347,7 +347,9 @@ class AxisSimulator:
             motion[order] = convolution.response_between(transfer, steps, steps * count)
             if order < orders - 1:
                 transfer = transfer * (convolution.s / natural)
-        if self._level:
+        if _lost_slow(links):
+            _level_out(motion, steps * self._n, natural / (self._rate * steps))
+        elif self._level:
             motion[0] += self._level * _static_gain(lambda s: _product(links, s))
         if not natural:
             return motion, None
@@ -403,6 +405,21 @@ def _changed_by_path(linear, deviation, interval_s, effects):
         passed = linear + deviation
         deviation = deviation + effect.change_motion(passed, interval_s) - passed
     return deviation
+
+
+def _lost_slow(links):
+    """Whether the reference has lost a constant and a slow drift, before a core."""
+    return any(0 in link.poles() for link in links[1:])
+
+
+def _level_out(motion, count, step):
+    """Take a straight line through the first `count` points out of a motion, and its slope out of
+    the derivative: neither is known, and a spring would take them for a load that grows."""
+    place = np.arange(motion.shape[1])
+    slope, constant = np.polyfit(place[:count], motion[0, :count], 1)
+    motion[0] -= constant + slope * place
+    if len(motion) > 1:
+        motion[1] -= slope / step
 
 
 def static_gain(model):
