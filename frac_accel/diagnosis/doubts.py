@@ -14,7 +14,7 @@ from .engine import LONG, WEIGHS
 from .gradual import gradual
 from .in_bands import otherwise_in_bands
 from .names import cancelling, undetermined
-from .problem import WRONG_BY_STEPS, Problem, acts_on_spring
+from .problem import WRONG_BY_STEPS, Problem, acts_on_spring, follows_path
 from .search import acts_as_filter
 from .words import AS_NOISE
 
@@ -765,7 +765,7 @@ def _out_of_sight(engine, best):
     if all(entry.is_known for entry in engine.loose.values()):
         return {}
     for cause, effect in _filters(engine, best).items():
-        corner = _corner_hz(effect, edge) if is_link(effect) else 0.0
+        corner = _corner_hz(effect, edge) if is_link(effect) and not follows_path(effect) else 0.0
         if corner > edge:
             found[cause] = f"its corner, {corner:.3g} Hz, lies beyond what is compared " \
                            f"({edge:.3g} Hz): there many filters, and cores, do the same"

@@ -22,9 +22,11 @@ _FAR = 8.0
 # The same of what the neighbours do not say: by so much the reference must stand out, by as many
 # times as much as the sensor, and as the reference itself does beside, and the sensor at most.
 _JUMPS, _TIMES, _QUIET = 6.0, 3.0, 5.0
-# Share of the power that the sensor does not show of the reference which must go with what the
-# reference has done alone: what else a sensor does after a jolt, as to ring on, is no such fault.
-_MISSED = 0.7
+# Share of what the filter makes of the faulty samples (power) that the fault must be: a sensor that
+# bends strong motion follows the most of these. Share of what the sensor lacks of the reference that
+# the fault may leave, and where the reference is as good as dead, to so many times its power: one
+# that bends motion, or rings on, lacks something else.
+_PART, _LEAVES, _DEAD, _LEAVES_DEAD = 0.15, 0.03, 100.0, 0.3
 # Samples up to which what is far out is one event, around it where the sensor must be quiet, and
 # beside it where the reference shows what is usual.
 _TOGETHER, _AROUND, _BESIDE = 16, 8, 50
@@ -54,8 +56,8 @@ def glitches(reference, sensor, valid):
     A motion shows on both sides. Where neither is what a filter makes of the other, one of them is
     wrong: the one that is not what its neighbours on both sides say (best linear interpolation,
     A. Papoulis, *Signal Analysis* (1977)), while the other goes on as before. What the sensor lacks
-    then is what the filter makes of the fault alone. A jolt that a slow sensor smooths, and after
-    which it rings for longer than the filter, lacks that of nothing.
+    then is what the filter makes of the fault alone. That is not so of a jolt that a slow sensor
+    smooths, and after which it rings for longer than the filter, nor of a burst that it bends.
     """
     if np.count_nonzero(valid) < 8 * (2 * _REACH + 1):
         return []
@@ -97,20 +99,29 @@ def glitches(reference, sensor, valid):
         if np.max(own[around]) > max(_JUMPS, _TIMES * quiet,
                                      _TIMES * np.max(as_usual, initial=0.0)) \
                 and quiet < _QUIET and np.max(there[around]) > _FAR and valid[around].all() \
-                and _goes_with(missed, fault, rows, taps[1]):
+                and _goes_with(missed, np.where(back > _FAR, [fault, pair[0]], 0.0), rows, taps[1]):
             found.append(rows)
     count = sum(rows.stop - rows.start for rows in found)
     return found if count <= _RARE * len(valid) else []
 
 
-def _goes_with(missed, fault, rows, taps):
-    """Whether what the sensor does not show of the reference is what a filter makes of a fault in
-    these rows."""
+def _goes_with(missed, faulty, rows, taps):
+    """Whether what the sensor lacks of the reference is what a filter makes of a fault in these
+    rows, and that is a good part of what it makes of the faulty samples; `faulty`: fault and
+    samples."""
     around = slice(max(rows.start - _REACH, 0), rows.stop + _REACH)
-    alone = np.zeros(around.stop - around.start)
-    alone[rows.start - around.start:rows.stop - around.start] = fault[rows]
     seen = missed[around]
-    return np.sum((seen + _centred(alone, taps)[:len(seen)])**2) < (1 - _MISSED) * np.sum(seen**2)
+    fault, whole = (_centred(_only(values, rows, around), taps)[:len(seen)] for values in faulty)
+    share = np.sum(fault**2) / max(np.sum(whole**2), np.finfo(float).tiny)
+    leaves = np.sum((seen + fault)**2) / np.sum(seen**2)
+    return share > _PART and leaves < (_LEAVES_DEAD if share > _DEAD else _LEAVES)
+
+
+def _only(values, rows, around):
+    """Values around some rows, with zeros beside these."""
+    part = np.zeros(around.stop - around.start)
+    part[rows.start - around.start:rows.stop - around.start] = values[rows]
+    return part
 
 
 def is_cut_off(values, there):

@@ -34,10 +34,10 @@ def walk(force, corner_hz, forward, backward):
     return moved
 
 
-def record(seed, duration_s=60.0, noise=0.005):
+def record(seed, duration_s=60.0, noise=0.005, corner_hz=(0.2, 2.0)):
     """Force and velocity of a random carriage, and its parameters."""
     rng = np.random.default_rng(seed)
-    corner = float(np.exp(rng.uniform(*np.log([0.2, 2.0]))))
+    corner = float(np.exp(rng.uniform(*np.log(corner_hz))))
     level, asymmetry = float(rng.uniform(0.3, 1.2)), float(rng.uniform(-0.3, 0.3))
     sine = Multisine(rng, lines=30, band_hz=(0.1, 5.0))
     # from rest, so that the motion from before the record is known
@@ -94,6 +94,18 @@ def test_found_again_and_nothing_else(with_model):
     assert abs(effect.level * gain / level - 1) < 0.03
     assert abs(effect.asymmetry - asymmetry) < 0.03
     assert found.verdict == "explained"
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_found_where_viscous_friction_hardly_lags(seed):
+    """It was taken for a dead zone, which it is but for its lag, beside filters."""
+    t, force, _, values, (corner, level, asymmetry) = record(50 + seed, 40.0, 0.001, (50.0, 150.0))
+    found = diagnose((samples(t, force), samples(t, values)), axis="x")
+    assert [finding.cause for finding in found.findings] == ["free_mass_friction"]
+    friction, std = found.findings[0].effect, found.findings[0].std
+    assert abs(friction.corner_hz - corner) < 4 * std["corner_hz"] < 0.3 * corner
+    assert abs(friction.level / level - 1) < 0.02
+    assert abs(friction.asymmetry - asymmetry) < 0.02
 
 
 @pytest.mark.parametrize("seed", range(1))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rig.hidden import draw_case
 from scipy.signal import butter, lfilter, resample_poly, sosfilt
 
 from frac_accel import Samples, diagnose
@@ -92,6 +93,16 @@ def test_a_jolt_after_which_a_slow_sensor_rings_for_long_is_motion(seed):
     sensor = slow + rng.uniform(0.03, 0.1) * (ringing - slow)
     noise = 0.002 * rng.normal(size=COUNT), 0.01 * sensor.std() * rng.normal(size=COUNT)
     assert glitches(motion + noise[0], sensor + noise[1], np.ones(COUNT, bool)) == []
+
+
+@pytest.mark.parametrize("seed", [0, 10, pytest.param(1, marks=pytest.mark.long),
+                                  pytest.param(7, marks=pytest.mark.long)])
+def test_bursts_of_motion_that_a_spring_bends_are_motion(seed):
+    """A hundred samples did not count, and the spring had no name."""
+    case = draw_case(seed, {"quadratic_stiffness"}, "dongle", "noise_bursts", 100.0)
+    reference, sensor, _ = case.samples()
+    assert not any("reference alone" in words
+                   for words in Record.of(reference, sensor, "x").integrity(0).words)
 
 
 @pytest.mark.parametrize("kind", [
