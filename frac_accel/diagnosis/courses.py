@@ -5,6 +5,7 @@ from scipy.signal import lfilter
 
 from ..budget.blocks import Blocks
 from ..budget.modulated import Modulated, cosines
+from ..errors import FracAccelError
 from ..model.effects import known_effects
 from ..model.effects.base import OFFSET
 from ..model.effects.course import KNOTS
@@ -105,8 +106,11 @@ def course_of(engine, best):
     for cause, cls in known_effects().items():
         if not cls.half_waves or cause in engine.search.base:
             continue
-        kept = _without_the_like(engine, best, cls)
-        target, before = _to_be_described(p, kept, cls)
+        try:
+            kept = _without_the_like(engine, best, cls)
+            target, before = _to_be_described(p, kept, cls)
+        except FracAccelError:
+            continue  # without the like of it, the motion has no bound
         left, waves, power = _left(cls.column(before), target, cls.half_waves, p.used)
         if left > 1 - _TAKES or power > _allowed(best.effects, kept) * own_power:
             continue

@@ -376,12 +376,16 @@ def _imitators(engine, best, takes, left):
                 if best.effects[cause].is_constant and taken < _RESEMBLES * rest}
     # a delay is common beside any filter
     odd = [cause for cause, effect in filters.items() if not effect.everyday] or list(filters)
-    # those that take little beside the largest may only mend what that lacks
-    most = max(takes.get(cause, np.inf) for cause in odd)
-    main = [cause for cause in odd if takes.get(cause, np.inf) > _MENDS * most]
-    clear = main if len(main) == 1 and most > rest * (
+    # those that take little beside the largest may only mend what that lacks, and those whose lag
+    # a lead takes back are no cause
+    phaseless = _without_phase(engine, best, odd)
+    does = {cause: min(takes.get(cause, np.inf), phaseless.get(cause, np.inf)) for cause in odd}
+    most = max(does.values())
+    main = [cause for cause in odd if does[cause] > _MENDS * most and cause not in phaseless]
+    clear = main if len(main) == 1 and (does[main[0]] > rest * (
         clearly if more is _MOVING or filters[main[0]].everyday or share < _MOSTLY
-        or _is_like_no_other(engine, best, main[0]) else _IMITATES) else []
+        or _is_like_no_other(engine, best, main[0]) else _IMITATES)
+        or phaseless and stands_in_its_band(engine, best, main[0])) else []
     if clear == odd:
         return {}
     linear = [cause for cause, effect in best.effects.items()
@@ -389,6 +393,26 @@ def _imitators(engine, best, takes, left):
               and cause not in clear
               and not _stands_out_at_its_peak(engine, best, cause, takes[cause])]
     return dict.fromkeys(linear, more.format(share))
+
+
+def _without_phase(engine, best, filters):
+    """RMS of what a filter does together with the delays that take back its lag, by the causes of
+    such pairs: a filter without a phase, of which either part alone takes much."""
+    p, found = engine.problem, {}
+    delays = [cause for cause in best.effects if best.effects[cause].pure_delay_s()
+              and not is_link(best.effects[cause])]
+    lead_s = -sum(best.effects[cause].pure_delay_s() for cause in delays)
+    for cause in filters if lead_s > 0 else ():
+        lag_s = _lag_s(best.effects[cause], 2 * np.pi / p.time[-1])
+        if cause in delays or abs(lag_s - lead_s) > _AS_LATE * lead_s:
+            continue
+        pair = [cause, *delays]
+        rest = {name: effect for name, effect in best.effects.items() if name not in pair}
+        try:
+            found |= dict.fromkeys(pair, engine.rms(best.simulated - p.simulate(rest)))
+        except FracAccelError:
+            continue
+    return found
 
 
 def stands_in_its_band(engine, fitted, cause):

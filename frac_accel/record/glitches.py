@@ -23,9 +23,9 @@ _FAR = 8.0
 # times as much as the sensor, and as the reference itself does beside, and the sensor at most.
 _JUMPS, _TIMES, _QUIET = 6.0, 3.0, 5.0
 # Share of what the filter makes of the faulty samples (power) that the fault must be: a sensor that
-# bends strong motion follows the most of these. Share of what the sensor lacks of the reference that
-# the fault may leave, and where the reference is as good as dead, to so many times its power: one
-# that bends motion, or rings on, lacks something else.
+# bends strong motion follows the most of these. Share of what the sensor lacks of the reference
+# that the fault may leave, and where the reference is as good as dead, to so many times its power:
+# one that bends motion, or rings on, lacks something else.
 _PART, _LEAVES, _DEAD, _LEAVES_DEAD = 0.15, 0.03, 100.0, 0.3
 # Samples up to which what is far out is one event, around it where the sensor must be quiet, and
 # beside it where the reference shows what is usual.

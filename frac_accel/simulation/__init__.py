@@ -283,7 +283,10 @@ class AxisSimulator:
         if delay_s:
             s = convolution.s
             transfer = transfer * exponentials(-s[0] * delay_s, -(s[1] - s[0]) * delay_s, len(s))
-        return convolution.response(transfer) + level
+        response = convolution.response(transfer) + level
+        if _lost_slow(model.dynamics):
+            _level_out(response[None], self._n, 1.0)
+        return response
 
     def _deviation(self, model, force, delay_s):
         """What the spring's force beyond its linear part adds, and what depends on the path."""

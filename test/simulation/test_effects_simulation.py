@@ -90,7 +90,7 @@ def test_around_a_nonlinear_core(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("cause", SPRING)
+@pytest.mark.parametrize("cause", [*SPRING, "gain_drift"])
 def test_behind_a_high_pass_of_the_reference(cause, seed):
     """A record that begins in mid-motion was integrated to a load that grew: half of what a cubic
     spring says was wrong. What is left comes from the motion before the record."""
