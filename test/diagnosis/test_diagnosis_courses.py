@@ -1,11 +1,17 @@
 """A gain or a zero that drifts along a course that follows no law: what a simulated road knows."""
 
+from unittest import mock
+
 import numpy as np
 import pytest
+from rig.hidden import draw_case
 from sampled_pair import sampled_pair
 from scipy.signal import butter, sosfilt, sosfiltfilt
+from searched import searched
 
 from frac_accel import SensorModel, diagnose, validate
+from frac_accel.diagnosis.courses import course_of
+from frac_accel.errors import FracAccelError
 from frac_accel.model.core import Gain
 from frac_accel.report.diagnosis import diagnosis_page
 
@@ -137,3 +143,12 @@ def test_a_zero_that_settles_beside_a_gain_that_drifts(seed, fastest):
     settling = findings["warm_up_drift"]
     assert abs(settling.effect.time_constant_s - settles_s) \
         < 4 * settling.std["time_constant_s"] < 0.05 * settles_s
+
+
+@pytest.mark.thorough
+def test_a_course_is_not_sought_where_the_motion_beside_it_has_no_bound():
+    """Without what changes along the record beside it, a spring may not hold its load: that ended
+    the diagnosis with an error."""
+    _, engine, best = searched(draw_case(0, ["offset_drift"]), time_limit_s=10)
+    with mock.patch.object(engine.problem, "simulate", side_effect=FracAccelError("no bound")):
+        assert course_of(engine, best) == {}
