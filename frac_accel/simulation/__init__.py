@@ -412,7 +412,7 @@ def _changed_by_path(linear, deviation, interval_s, effects):
 
 def _lost_slow(links):
     """Whether the reference has lost a constant and a slow drift, before a core."""
-    return any(0 in link.poles() for link in links[1:])
+    return any(link.of_reference and 0 in link.poles() for link in links[1:])
 
 
 def _level_out(motion, count, step):

@@ -35,7 +35,7 @@ class FreeMassFriction(Effect):
     # without dry friction it is a low-pass
     nested = ("level",)
 
-    # with a corner at the Nyquist frequency it is a dead zone of the force
+    # with a corner far above the sampling rate it is a dead zone of the force
     corner_hz: float = parameter("Hz", above=0, scale="rate", reach=(1e-6, 2.0), null=np.inf)
     level: float = parameter("output units", minimum=0, scale=(0.1, "level"), null=0.0)
     asymmetry: float = parameter("1", above=-1, below=1, scale=0.1, default=0.0)
