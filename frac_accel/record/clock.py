@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import FracAccelError
 from ..signals.sample_rate import estimate_rate
+from ..signals.straight_line import straight_line
 
 # Scatter of the stamps [intervals] with which rounding still finds the instants, and the share of
 # samples that may have more.
@@ -141,12 +142,12 @@ class Clock:
             steps = np.diff(merged(seconds))
             return cls("uneven", float(1 / np.percentile(steps, _LONG_STEP)), 0.0,
                        np.empty(0), 0.0)
-        slope, start = _line(slot, seconds)
+        slope, start = straight_line(slot, seconds)
         late = seconds - (slope * slot + start)
         scatter, jump = float(np.std(late)), _set_once(slot, seconds, late, slope)
         if jump is not None:
             before = jump.undone(seconds)
-            slope, start = _line(slot, before)
+            slope, start = straight_line(slot, before)
             scatter = float(np.std(before - (slope * slot + start)))
             at = np.searchsorted(seconds, jump.at_s)
             if slot[at] - slot[at - 1] == 1:
@@ -351,7 +352,7 @@ def _tuned(seconds, interval):
         best = int(np.argmax(np.abs(sums)))
         if span >= seconds[-1]:
             place = seconds * tried[best] - np.angle(sums[best]) / (2 * np.pi)
-            line = _line(np.round(place), seconds)
+            line = straight_line(np.round(place), seconds)
             place = (seconds - line[1]) / line[0]
             return np.std(place - np.round(place)), line[0], place
         low, high = tried[best] + np.array([-0.5, 0.5]) / span
@@ -361,11 +362,11 @@ def _tuned(seconds, interval):
 def _grown(seconds, slots):
     """Line through the first stamps, over ever more of them."""
     length = len(slots)
-    line = _line(slots, seconds[:length])
+    line = straight_line(slots, seconds[:length])
     while length < len(seconds):
         length = min(2 * length, len(seconds))
         place = (seconds[:length] - line[1]) / line[0]
-        line = _line(np.round(place), seconds[:length])
+        line = straight_line(np.round(place), seconds[:length])
     return line
 
 
@@ -389,14 +390,6 @@ def _set_once(slot, seconds, late, interval):
     if taken.max() < _ONE_JUMP * (late @ late):
         return None
     return Jump(float(seconds[at]), float(sums[at] / power[at]))
-
-
-def _line(place, values):
-    """Slope of the least-squares line, and its value at 0; `np.polyfit` takes ten times as long."""
-    middle, mean = place.mean(), values.mean()
-    away = place - middle
-    slope = away @ (values - mean) / (away @ away)
-    return slope, mean - slope * middle
 
 
 def _batches(seconds):

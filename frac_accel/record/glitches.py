@@ -85,6 +85,7 @@ def glitches(reference, sensor, valid):
     far = np.flatnonzero(valid & (back > _FAR))
     if not len(far):
         return []
+    faulty = np.where(back > _FAR, [fault, pair[0]], 0.0)
     found, near = [], np.zeros(len(valid), bool)
     runs = [slice(max(run[0] - 1, 0), run[-1] + 2)
             for run in np.split(far, np.flatnonzero(np.diff(far) > _TOGETHER) + 1)]
@@ -99,7 +100,7 @@ def glitches(reference, sensor, valid):
         if np.max(own[around]) > max(_JUMPS, _TIMES * quiet,
                                      _TIMES * np.max(as_usual, initial=0.0)) \
                 and quiet < _QUIET and np.max(there[around]) > _FAR and valid[around].all() \
-                and _goes_with(missed, np.where(back > _FAR, [fault, pair[0]], 0.0), rows, taps[1]):
+                and _goes_with(missed, faulty, rows, taps[1]):
             found.append(rows)
     count = sum(rows.stop - rows.start for rows in found)
     return found if count <= _RARE * len(valid) else []

@@ -14,6 +14,7 @@ from ..model.effects.base import CORE, GAIN, Circumstances
 from ..record.sources import is_bag
 from ..signals.convolution import Convolution, at_positions, every, exponentials
 from ..signals.kept import kept
+from ..signals.straight_line import straight_line
 from .modes import modes_of
 
 # Samples at both ends that the band-limited simulation of a record cannot know: what the base did
@@ -419,7 +420,7 @@ def _level_out(motion, count, step):
     """Take a straight line through the first `count` points out of a motion, and its slope out of
     the derivative: neither is known, and a spring would take them for a load that grows."""
     place = np.arange(motion.shape[1])
-    slope, constant = np.polyfit(place[:count], motion[0, :count], 1)
+    slope, constant = straight_line(place[:count], motion[0, :count])
     motion[0] -= constant + slope * place
     if len(motion) > 1:
         motion[1] -= slope / step
