@@ -87,7 +87,7 @@ def glitches(reference, sensor, valid):
         return []
     faulty = np.where(back > _FAR, [fault, pair[0]], 0.0)
     found, near = [], np.zeros(len(valid), bool)
-    runs = [slice(max(run[0] - 1, 0), run[-1] + 2)
+    runs = [slice(max(run[0] - 1, 0), min(run[-1] + 2, len(valid)))
             for run in np.split(far, np.flatnonzero(np.diff(far) > _TOGETHER) + 1)]
     for rows in runs:
         # as far as it makes others stand out, too

@@ -56,6 +56,15 @@ def test_what_only_the_reference_does_is_found(kind, seed):
     assert not (inside & ~near).any()
 
 
+@pytest.mark.parametrize("at", [0, COUNT - 2, COUNT - 1])
+def test_a_fault_at_an_end_of_the_record_is_as_good_as_any(at):
+    from_rest_to_rest = np.sin(np.linspace(0, np.pi, COUNT))
+    reference, sensor = (values * from_rest_to_rest for values in pair(np.random.default_rng(17)))
+    reference[at] += 20
+    rows, = glitches(reference, sensor, np.ones(COUNT, bool))
+    assert 0 <= rows.start <= at < rows.stop <= COUNT
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fault_of_the_sensor_is_none_of_the_reference(kind):
     rng = np.random.default_rng([992, len(kind)])
