@@ -15,6 +15,8 @@ from .gain import gain
 _FROM_ACROSS = 0.2
 # Share of an axis at which a fit begins.
 _ACROSS = 1e-3
+# Share of what another axis leaves (power) below which it shows causes that were found on this one.
+_FOLLOWS = 0.5
 # Share of another axis that a sensor shows which was mounted by eye (a degree or so), and standard
 # uncertainties from which a zero is more open than its fit alone says.
 _BY_EYE, _MORE_OPEN = 0.02, 2.0
@@ -44,9 +46,11 @@ class OtherAxes:
         """Of these effects, by cause, what the other axes have too."""
         return {cause: effect for cause, effect in effects.items() if self.have(effect)}
 
-    def shown_by(self, effects):
-        """The same as far as a set of effects (by cause) shows it: by what comes across."""
-        return dataclasses.replace(self, alike=self.alike and _crosses(effects))
+    def shown_by(self, problem, effects):
+        """The same as far as the record shows it: by what comes across with these effects (by
+        cause), or of a turned sensor by the other axes' own samples."""
+        alike = self.alike and (_crosses(effects) or _others_follow(problem, effects))
+        return dataclasses.replace(self, alike=alike)
 
     def said(self, finding):
         """A finding with words where it is written for all axes."""
@@ -54,7 +58,7 @@ class OtherAxes:
             return finding
         return dataclasses.replace(finding, evidence=[
             *finding.evidence,
-            "written for all axes: what comes across from the others shows it as well"])
+            "written for all axes: the others show it as well"])
 
 
 # Nothing but what is common to all axes by its nature.
@@ -62,7 +66,28 @@ UNLIKE = OtherAxes()
 
 
 def _crosses(effects):
-    return any(effect.mixes_axes for effect in effects.values())
+    """Whether the other axes' outputs are part of this one's."""
+    return any(effect.mixes_outputs for effect in effects.values())
+
+
+def _others_follow(problem, effects):
+    """Whether each other axis of a turned sensor follows its reference far better with the mount,
+    dynamics and filters of these effects than without, but for its gain and its zero."""
+    p, unlike = problem, dataclasses.replace(problem.others, alike=False)
+    common = unlike.common(effects)
+    every = {**common, **{cause: effect for cause, effect in effects.items()
+                          if is_of_all_if_alike(effect)}}
+    others = [axis for axis in range(len(AXES)) if axis != p.axis
+              and np.ptp(p.record.sensor[p.used, axis]) > 0]
+    if every == common or not others or not any(e.mixes_axes for e in effects.values()):
+        return False
+
+    def left(axis, effects):
+        output = p.response(axis, tuple(effects.values()))[p.used]
+        rest = p.record.sensor[p.used, axis] - p.record.sensor[p.used, axis].mean()
+        output = output - output.mean()
+        return rest @ rest - (output @ rest)**2 / max(output @ output, np.finfo(float).tiny)
+    return all(left(axis, every) < _FOLLOWS * left(axis, common) for axis in others)
 
 
 def is_of_all_if_alike(effect):
@@ -164,7 +189,7 @@ def fit_shares(problem, effects, output, rest):
     p = problem
     cls, = (cls for cls in known_effects().values() if cls.describes == "across")
     others = cls.fitted_parameters(AXES[p.axis], p.excited)
-    if not others or _crosses(effects):
+    if not others or any(effect.mixes_axes for effect in effects.values()):
         raise FracAccelError("nothing more can come across")
     learning = p.restricted(p.used & ~rest)
     start = cls(**dict.fromkeys(others, _ACROSS))

@@ -11,6 +11,7 @@ from ..errors import FracAccelError
 from ..identification.response.excitation import strongest_stretch
 from ..model import AXES, AxisModel, is_link
 from ..model.core.static_force import StaticForce
+from ..model.effects.axis_mixing import mix
 from ..model.effects.base import CORE, DEAD_ZONE, GAIN, INTERFERENCE, Effect
 from ..model.parameters import Scales, fixed_values, parameter_fields
 from ..signals.kept import kept
@@ -32,6 +33,8 @@ _SINGULAR = 1e-10
 # that, which bends no fit).
 _STEPS, WRONG_BY_STEPS = 4, 3e-4
 _STEPS_OF_SLOPES = 2
+# Turns of the sensor whose motion stays in memory: a fit tries each angle in both directions.
+_TURNS = 4
 # Frequencies over which a density is integrated.
 _LINES = 2049
 # Times the largest measured value from which a simulated one counts as without a bound.
@@ -223,6 +226,7 @@ class Problem:
         """Keep nothing that has been simulated; it is made again when asked for."""
         self._simulators = {}
         self._last, self._moved, self._others = (None, None), (None, None), {}
+        self._turned = {}
         self._columns, self._mixings = {}, {}
 
     @property
@@ -244,13 +248,29 @@ class Problem:
         record was; or the "whole" before any filter.
         """
         if (axis, steps, part) not in self._simulators:
-            record, filtered = self.record, part in (None, "linear")
-            self._simulators[axis, steps, part] = AxisSimulator(
-                record.reference[:, axis] if filtered else record.unfiltered, self.rate,
-                record.temperature_c, start_time_s=record.since_start_s, steps_per_sample=steps,
-                lag_s=record.lag_s, shown=self.in_band.added if part == "deviation" else None,
-                only=None if part == "whole" else part)
+            self._simulators[axis, steps, part] = self._new_simulator(
+                np.eye(3)[axis], axis, steps, part)
         return self._simulators[axis, steps, part]
+
+    def _new_simulator(self, shares, axis, steps, part):
+        """Simulator of an axis along which the base moves by so much of each of its own axes."""
+        record = self.record
+        motion = mix(record.reference, shares[None])[:, 0]
+        if part not in (None, "linear"):
+            motion = motion + shares[axis] * (record.unfiltered - record.reference[:, axis])
+        return AxisSimulator(
+            motion, self.rate, record.temperature_c, start_time_s=record.since_start_s,
+            steps_per_sample=steps, lag_s=record.lag_s,
+            shown=self.in_band.added if part == "deviation" else None,
+            only=None if part == "whole" else part)
+
+    def _simulator_of(self, model, axis, steps=_STEPS, part=None):
+        """`simulator` of a model of an axis, which may be turned."""
+        shares = model.base_shares(axis)
+        if np.array_equal(shares, np.eye(3)[axis]):
+            return self.simulator(axis, steps, part)
+        return kept(self._turned, (*shares, axis, steps, part), self._new_simulator,
+                    shares, axis, steps, part, most=_TURNS)
 
     def _respond(self, model, steps):
         """Output of core and links of the diagnosed axis; besides, where a law of the output will
@@ -259,10 +279,11 @@ class Problem:
         parts = [None]
         if self.record.unfiltered is not None and bends:
             parts = ["linear", "deviation"]
-        outputs = [sum(self.simulator(self.axis, steps, part).respond(model) for part in parts)]
+        outputs = [sum(self._simulator_of(model, self.axis, steps, part).respond(model)
+                       for part in parts)]
         if self.record.unfiltered is not None \
                 and any(effect.stage == DEAD_ZONE for effect in model.effects):
-            outputs.append(self.simulator(self.axis, steps, "whole").respond(model))
+            outputs.append(self._simulator_of(model, self.axis, steps, "whole").respond(model))
         return outputs
 
     def axis_model(self, effects, axis=None):
@@ -274,7 +295,8 @@ class Problem:
                                                  key=lambda effect: effect.stage)))
 
     def simulate(self, effects, across=True, steps=_STEPS):
-        """Output of the axis with these causes, shape (n,); without what comes across if asked."""
+        """Output of the axis with these causes, shape (n,); without what other axes' outputs add if
+        asked."""
         self.calls += 1
         model = self.axis_model(effects)
         circumstances = self.simulator(self.axis, steps).circumstances
@@ -285,18 +307,17 @@ class Problem:
             elif effect.stage == INTERFERENCE and self.in_band:
                 added = effect.live(self.rate).simulate(outputs[0], circumstances) - outputs[0]
                 outputs = [outputs[0] + (self.in_band.filtered(added) if added.any() else 0.0)]
-            elif not effect.mixes_axes:
+            elif not effect.mixes_outputs:
                 outputs = [effect.live(self.rate).simulate(values, circumstances)
                            for values in outputs]
             else:
                 own = effect.share_of_axes(self.axis)[self.axis]
-                added = self._across(effects, effect, model.gain) if across else 0.0
+                added = self._across(effects, effect) if across else 0.0
                 outputs = [own * values + added for values in outputs]
         return outputs[0]
 
-    def _across(self, effects, effect, gain):
-        """What an effect adds of the other axes where the own one has a constant gain; so little
-        that few steps do.
+    def _across(self, effects, effect):
+        """What an effect adds of the other axes' outputs; so little that few steps do.
 
         These have the model in use, and of the causes only what is the same for all axes.
         """
@@ -308,11 +329,8 @@ class Problem:
             model = self.axis_model(common, other)
             before = AxisModel(model.core, tuple(e for e in model.effects
                                                  if e.stage < effect.stage))
-            gains = [before.gain] * len(AXES)
-            gains[self.axis] = gain
-            total += effect.behind_gains(gains).share_of_axes(self.axis)[other] * kept(
-                self._others, (other, before.effects),
-                self.simulator(other, _STEPS_OF_SLOPES).simulate, before)
+            simulator = self._simulator_of(before, other, _STEPS_OF_SLOPES)
+            total += share * kept(self._others, (other, before.effects), simulator.simulate, before)
         return total
 
     def change(self, effects, cause, effect, by_links=True):
@@ -338,7 +356,7 @@ class Problem:
                         added, self.simulator(self.axis).circumstances)
             return added
         before = {**linear, cause: effects[cause]} if cause in effects else linear
-        across = effect.mixes_axes or (
+        across = effect.mixes_outputs or (
             by_links and is_link(effect) and self.others.have(effect))
         # beside a path, few steps show as much of what joins it as a first order is worth
         few = cause not in effects and any(map(follows_path, [effect, *linear.values()]))
@@ -357,9 +375,10 @@ class Problem:
         return self.change(effects, cause, effect, not self._hardly_crossed(effects))
 
     def _hardly_crossed(self, effects):
-        """Whether the other axes add so little that a first order may leave out its change."""
+        """Whether the other axes' outputs add so little that a first order may leave out its
+        change."""
         return all(np.abs(np.delete(effect.share_of_axes(self.axis), self.axis)).sum() < _CROSSED
-                   for effect in self.axis_model(effects).effects if effect.mixes_axes)
+                   for effect in self.axis_model(effects).effects if effect.mixes_outputs)
 
     def force(self, model, effect, motion):
         """First-order response to a force along a motion."""
@@ -371,7 +390,7 @@ class Problem:
         model = self.axis_model(effects)
         model = AxisModel(model.core, tuple(e for e in model.effects if e.stage <= CORE))
         if self._moved[0] != model:
-            self._moved = model, self.simulator(self.axis).respond(model)
+            self._moved = model, self._simulator_of(model, self.axis).respond(model)
         return self._moved[1]
 
     def _remembered(self, effects, across, steps=_STEPS):
@@ -438,8 +457,8 @@ class Problem:
     def response(self, axis, links=()):
         """Output of one axis of the model in use, with effects that all axes have, before those on
         the samples, shape (n,)."""
-        return self.simulator(axis).respond(
-            self.axis_model({effect.cause: effect for effect in links}, axis))
+        model = self.axis_model({effect.cause: effect for effect in links}, axis)
+        return self._simulator_of(AxisModel(model.core, links), axis).respond(model)
 
     def mirrored(self):
         """The same problem with the reference turned round."""
@@ -656,7 +675,7 @@ class Problem:
         steps = _STEPS_OF_SLOPES if forced or pathed else _STEPS
         before = point.simulated
         model = self.axis_model(point.effects)
-        crossed = any(effect.mixes_axes for effect in model.effects)
+        crossed = any(effect.mixes_outputs for effect in model.effects)
         if forced and (crossed or not fit.rough):
             try:
                 before = self.simulate(point.effects, False, steps)
@@ -679,12 +698,12 @@ class Problem:
                 try:
                     new = self.replaced(point.effects, fit.unknowns, moved)
                     effect = new[unknown.cause]
-                    if forced and (effect.mixes_axes or not (
+                    if forced and (effect.mixes_outputs or not (
                             fit.exact or effect.stage > CORE or acts_on_spring(effect))):
                         change = self.change(point.effects, unknown.cause, effect)
                     else:
                         # with forces, what comes across stays as it is: a few per cent of a column
-                        across = not forced and not (alone and not effect.mixes_axes)
+                        across = not forced and not (alone and not effect.mixes_outputs)
                         change = self.simulate(new, across, steps) \
                             - (before if across or forced else before_alone)
                     self._require_bound(change)

@@ -292,7 +292,7 @@ def _told(engine, likely, named, described, found):
     at_limit = engine.at_limit if any(f.effect.read_off for f in findings) else None
     rest = engine.budget_shown(fitted, at_limit) if output is None else \
         engine.budget_between(p.recorded, output, p.record.valid)
-    others = p.others.shown_by(effects)
+    others = p.others.shown_by(p, effects)
     findings = [_beside_unseen_core(others.said(f), delay_of_unseen_core(engine, fitted))
                 for f in findings]
     more = [*engine.words_of_budget, *(noise.words if noise.rms is None else ())]
@@ -554,7 +554,7 @@ def _extended(engine, effects, stated):
     """The model in use with these causes on the diagnosed axis, and what is stated of it."""
     p = engine.problem
     own = p.axis_model(effects)
-    common = p.others.shown_by(effects).common(effects)
+    common = p.others.shown_by(p, effects).common(effects)
     axes = {name: p.axis_model(common, i) for i, name in enumerate(AXES)}
     axes[AXES[p.axis]] = own
     axes = {name: AxisModel(axis.core, tuple(e for e in axis.effects if not e.of_reference))

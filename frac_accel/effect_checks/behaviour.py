@@ -32,7 +32,7 @@ _FORCED = 0.25
 
 _ON_SAMPLES = ("simulate", "invert", "live", "simulate_axes", "invert_axes")
 _ON_MOTION = ("transfer_function", "pure_delay_s", "clock_ratio", "change_core", "add_force",
-              "change_motion")
+              "change_motion", "share_of_axes")
 
 
 def stays_finite(cls, draws):

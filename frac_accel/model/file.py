@@ -17,6 +17,8 @@ from ..io.regular_file import open_regular
 from .core import CORES, Arx, Oscillator
 from .core.static_force import StaticForce
 from .effects import Circumstances, Effect, effect_names, effect_of
+from .effects.axis_mixing import mix
+from .effects.base import TURN
 from .parameters import as_mapping, build, number, parameter_fields, plain
 
 SCHEMA = "frac_accel/sensor_model/1"
@@ -57,6 +59,15 @@ class AxisModel:
         for effect in self.effects:
             force = effect.add_force(force)
         return force
+
+    def base_shares(self, axis):
+        """Share of each of the reference's axes, shape (3,), in the acceleration along this one,
+        `axis` (0, 1, 2)."""
+        shares = np.eye(3)[axis]
+        for effect in self.effects[::-1]:
+            if effect.stage == TURN:
+                shares = shares @ np.stack([effect.share_of_axes(i) for i in range(3)])
+        return shares
 
     def base_gain(self, time_s):
         """Gain of the base's acceleration before the core at times since the record's start."""
@@ -213,6 +224,32 @@ class SensorModel:
     def axis(self, axis):
         """AxisModel of ``"x"``, ``"y"``, ``"z"`` or 0, 1, 2."""
         return self.axes[AXES.index(axis) if isinstance(axis, str) else axis]
+
+    @functools.cached_property
+    def turns(self):
+        """Whether the sensor's axes are not the reference's."""
+        return not np.array_equal(self._turn, np.eye(3))
+
+    @functools.cached_property
+    def _turn(self):
+        return np.stack([axis.base_shares(i) for i, axis in enumerate(self.axes)])
+
+    @functools.cached_property
+    def _turn_back(self):
+        # where one axis was diagnosed alone, and is another one, that one is not known twice
+        known = abs(np.linalg.det(self._turn)) > 1e-3
+        return np.linalg.inv(self._turn) if known else np.eye(3)
+
+    def along_sensor(self, values):
+        """Acceleration along the sensor's axes from that along the reference's, shape (n, 3)."""
+        return mix(values, self._turn) if self.turns else values
+
+    def along_reference(self, values, variance):
+        """Acceleration and its variance along the reference's axes from those along the sensor's,
+        shape (n, 3)."""
+        if not self.turns:
+            return values, variance
+        return mix(values, self._turn_back), mix(variance, self._turn_back**2)
 
     @functools.cached_property
     def needs_temperature(self):
@@ -455,10 +492,10 @@ def _removed(stages, values, variance, circumstances):
 
 def _sample_stages(axes):
     """Pairs of effect class and its instances by axis index, in signal order."""
-    stages, gains = {}, [axis.gain for axis in axes]
+    stages = {}
     for index, axis in enumerate(axes):
         for effect in axis.effects:
-            stages.setdefault((effect.stage, effect.cause), {})[index] = effect.behind_gains(gains)
+            stages.setdefault((effect.stage, effect.cause), {})[index] = effect
     return [(type(next(iter(by_axis.values()))), by_axis)
             for _, by_axis in sorted(stages.items(), key=lambda item: item[0])]
 

@@ -107,6 +107,7 @@ def simulate(model: SensorModel, reference: Any, sampling_rate_hz: float | None 
         values[:, column] = reference
     if values.ndim != 2 or values.shape[1] != 3 or not len(values):
         raise FracAccelError(f"reference: shape {np.shape(reference)} given, expected (n, 3)")
+    values = model.along_sensor(values)
     result = np.empty_like(values)
     for i, axis_model in enumerate(model.axes):
         simulator = AxisSimulator(values[:, i], sampling_rate_hz, temperature_c, start_time_s,

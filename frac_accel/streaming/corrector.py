@@ -89,12 +89,12 @@ class Corrector(Stream):
         return values, variance
 
     def _after(self, values, variance, index, stamps_ns):
-        if not self._changes_base:
-            return values, variance
-        time_s = 1e-9 * (self._stamps(stamps_ns) - self._record_start_ns)
-        gain = np.stack([np.broadcast_to(axis.base_gain(time_s), len(time_s))
-                         for axis in self._model.axes], axis=1)
-        return values / gain, variance / gain**2
+        if self._changes_base:
+            time_s = 1e-9 * (self._stamps(stamps_ns) - self._record_start_ns)
+            gain = np.stack([np.broadcast_to(axis.base_gain(time_s), len(time_s))
+                             for axis in self._model.axes], axis=1)
+            values, variance = values / gain, variance / gain**2
+        return self._model.along_reference(values, variance)
 
     def _stated_range(self):
         model = self._model

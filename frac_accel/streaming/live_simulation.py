@@ -46,6 +46,9 @@ class LiveSimulator(Stream):
         super()._begin()
         self._effects = self._model.live_simulation(self.sampling_rate_hz)
 
+    def _before(self, values, variance, index, stamps_ns):
+        return self._model.along_sensor(values), variance
+
     def _after(self, values, variance, index, stamps_ns):
         return self._effects(values, self._circumstances(index, stamps_ns)), variance
 

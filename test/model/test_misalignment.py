@@ -47,6 +47,37 @@ def test_simulated_as_scipy_turns_it_and_turned_back(angles):
     assert np.std(error) < 0.02 * np.std(reference)
 
 
+def test_a_turn_comes_before_all_else_that_an_axis_does():
+    _, _, reference, _ = motion(4)
+    turn = {"cause": "misalignment", "roll_deg": 12.0, "pitch_deg": -8.0, "yaw_deg": 25.0}
+    behind = {"x": [{"cause": "cubic_stiffness", "alpha3": 2e-3},
+                    {"cause": "low_pass_lag", "corner_hz": 40.0}],
+              "y": [{"cause": "backlash", "gap": 0.5}, {"cause": "sensitivity_error", "gain": 0.8}],
+              "z": []}
+    plain, turns = (SensorModel.from_dict({
+        "schema": "frac_accel/sensor_model/1", "axes": {
+            axis: {"core": {"natural_frequency_hz": 120.0, "damping_ratio": 0.4},
+                   "effects": [*before, *effects]} for axis, effects in behind.items()}})
+        for before in ([], [turn]))
+    np.testing.assert_allclose(simulate(turns, reference, RATE),
+                               simulate(plain, turned(reference, 12.0, -8.0, 25.0), RATE),
+                               atol=1e-9)
+
+
+def test_a_turn_is_undone_behind_what_else_an_axis_does():
+    _, t, reference, _ = motion(4)
+    turn = {"cause": "misalignment", "yaw_deg": 30.0}
+    slow = {"cause": "low_pass_lag", "corner_hz": 60.0}
+    core = {"natural_frequency_hz": 300.0, "damping_ratio": 0.7}
+    sensor = SensorModel.from_dict({
+        "schema": "frac_accel/sensor_model/1", "core": core, "effects": [turn],
+        "axes": {"x": {"core": core, "effects": [turn, slow]}}})
+    made = samples(t, simulate(sensor, reference, RATE))
+    corrected = Corrector(sensor, RATE, noise_std=0.01).process(made.stamps_ns, made.values)
+    error = (corrected.values - reference[corrected.index])[300:-300]
+    assert np.std(error) < 0.02 * np.std(reference)
+
+
 @pytest.mark.parametrize("angles", [(1.0, -2.0, 3.0), (12.0, -9.0, -7.0)])
 def test_found_again_and_nothing_else(angles):
     rng, t, reference, output = motion(2)

@@ -18,7 +18,7 @@ _NOISY = {"reference_noise", "sampling_jitter", "polled_readout", "interference_
           "timestamp_jitter", "dropped_samples", "clipping", "quantization", "tone_interference"}
 # A stiff stop needs finer steps, an average of the reference has lost what lies at its zeros, and a
 # diagnosis of one axis does not give the others its causes unless they show them.
-_INEXACT = {"impact_stop", "reference_smoothing", "cross_axis_sensitivity", "misalignment"}
+_INEXACT = {"impact_stop", "reference_smoothing", "cross_axis_sensitivity"}
 _BENT = {"quadratic_stiffness", "cubic_stiffness", "hysteresis", "coulomb_friction",
          "stiffness_drift", "quadratic_damping", "backlash", "gain_drift", "gain_step",
          "temperature_sensitivity"}
@@ -35,8 +35,9 @@ def pairs():
     found = [pair for pair in itertools.combinations(causes, 2)
              if not any(set(pair) == other for other in map(set, INSEPARABLE))
              and not (_BEHIND in pair and set(pair) & _BENT)]
-    # a spring or a gain that changes behind a high-pass of the reference comes first
-    first = [pair for pair in found if "reference_ac_coupling" in pair and set(pair) & _BENT]
+    # a spring or a gain that changes behind a high-pass of the reference, or a turn, comes first
+    first = [pair for before in ("reference_ac_coupling", "misalignment") for pair in found
+             if before in pair and set(pair) & _BENT]
     order = np.random.default_rng(2026).permutation(len(found))
     return first + [found[i] for i in order if found[i] not in first]
 

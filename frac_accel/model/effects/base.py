@@ -24,8 +24,8 @@ from ..parameters import is_varied, parameter_fields
 
 # Place in the signal's way through the sensor, from base to record. What happened to the reference
 # on its way to the record is undone before.
-(REFERENCE, MOUNTING, CORE, CONDITIONER, DELAY, TURN, GAIN, CROSS_AXIS, OFFSET, DEAD_ZONE,
- INTERFERENCE, CLIPPING, QUANTIZATION, STAMPS) = range(-1, 13)
+(REFERENCE, TURN, MOUNTING, CORE, CONDITIONER, DELAY, GAIN, CROSS_AXIS, OFFSET, DEAD_ZONE,
+ INTERFERENCE, CLIPPING, QUANTIZATION, STAMPS) = range(-2, 12)
 
 
 class Circumstances(NamedTuple):
@@ -504,17 +504,17 @@ class Effect:
         """Whether it brings something across from other axes."""
         return self.stage in (TURN, CROSS_AXIS)
 
-    def share_of_axes(self, axis):
-        """Share of each axis's output, shape (3,), in that of an axis (0, 1, 2), itself included.
+    @property
+    def mixes_outputs(self):
+        """Whether it brings something across from other axes' outputs."""
+        return self.stage == CROSS_AXIS
 
-        Of effects that mix the axes.
+    def share_of_axes(self, axis):
+        """Share of each axis, shape (3,), in an axis (0, 1, 2), itself included, of effects that mix
+        the axes: of the base's acceleration in that along the sensor's axis at the stage of a turn,
+        of the axes' outputs at that of cross-axis sensitivity.
         """
         return np.eye(3)[axis]
-
-    def behind_gains(self, gains):
-        """The same effect on outputs of axes that have constant gains (three) already, though these
-        come after it."""
-        return self
 
     @classmethod
     def simulate_axes(cls, values, by_axis, circumstances):

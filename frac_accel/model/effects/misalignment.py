@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 
 from ..parameters import parameter
-from .axis_mixing import mix, mixing_matrix
 from .axis_turn import turn_of
 from .base import TURN, Effect
 from .fit_starts import Start, finite
@@ -30,9 +29,8 @@ class Misalignment(Effect):
     r"""Orientation of the sensor in the reference's frame (REP 103: fixed axes, right-handed).
 
     :math:`R = R_z(\text{yaw}) R_y(\text{pitch}) R_x(\text{roll})` turns a vector's components in
-    the sensor's axes into those in the reference's; the sensor says
-    :math:`R^T a_\text{reference}`, each axis with its gain :math:`G`. With axes that are alike but
-    for that, the turn acts on their outputs :math:`G a` as :math:`G R^T G^{-1}`.
+    the sensor's axes into those in the reference's; the sensor feels
+    :math:`R^T a_\text{reference}`, before anything else.
     """
 
     cause = "misalignment"
@@ -100,12 +98,6 @@ class Misalignment(Effect):
     def share_of_axes(self, axis):
         return self.rotation[:, axis]
 
-    def behind_gains(self, gains):
-        gains = tuple(map(float, gains))
-        if not all(gains) or len(set(gains)) == 1:
-            return self
-        return _BehindGains(self.roll_deg, self.pitch_deg, self.yaw_deg, gains)
-
     def with_other_axes(self, axis, shares):
         """The same turn but for one about the axis itself, which only the others see."""
         others = [(axis + 1) % 3, (axis + 2) % 3]
@@ -137,19 +129,6 @@ class Misalignment(Effect):
         return sorted({_ABOUT[frozenset(axis + other)] for other in others})
 
     @classmethod
-    def simulate_axes(cls, values, by_axis, circumstances):
-        return mix(values, mixing_matrix(by_axis))
-
-    @classmethod
-    def invert_axes(cls, values, variance, by_axis, circumstances):
-        matrix = mixing_matrix(by_axis)
-        if abs(np.linalg.det(matrix)) < 1e-3:
-            # one axis was diagnosed alone, and is another one: that one is not known twice
-            return values, variance
-        inverse = np.linalg.inv(matrix)
-        return mix(values, inverse), mix(variance, inverse**2)
-
-    @classmethod
     def starts(cls, view):
         turn = turn_of(view)
         if turn is None:
@@ -161,16 +140,6 @@ class Misalignment(Effect):
             starts.append(Start(
                 cls(*turn), tuple(cls(**{angle: _SMALL_DEG}) for angle in angles), "free"))
         return starts
-
-
-@dataclasses.dataclass(frozen=True)
-class _BehindGains(Misalignment):
-    """The turn as it mixes outputs of axes with constant gains."""
-
-    gains: tuple = (1.0, 1.0, 1.0)
-
-    def share_of_axes(self, axis):
-        return super().share_of_axes(axis) * self.gains[axis] / np.array(self.gains)
 
 
 # The angle that mixes two axes where it is small.
