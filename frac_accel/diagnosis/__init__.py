@@ -143,6 +143,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     record = Record.of(*source, axis, temperature)
     record, source, orientation, turned = _in_axes_of_reference(
         record, source, axis, temperature, model)
+    model = model and record.as_laid_out(model)
     found = record.integrity(column)
     found.words.extend(turned)
     if len(record) < _FEWEST:
@@ -608,7 +609,7 @@ def _shown(found, record, column, used):
     those that say nothing of other causes."""
     measured = record.sensor[:, column]
     effects = {cause: effect.of_record(found, measured)
-               for cause, effect in known_effects().items() if effect.read_off}
+               for cause, effect in known_effects().items()}
     effects = {cause: effect for cause, effect in effects.items() if effect is not None}
     stray = used & spikes(measured, record.reference[:, column], found.step)
     silent = np.zeros(len(used), bool)

@@ -86,6 +86,8 @@ class View:
     is_motion: bool = False
     gain: float = 1.0
     offset: float = 0.0
+    # whether a force or a path bends the motion
+    is_bent: bool = False
 
     @functools.cached_property
     def equation(self):
@@ -322,7 +324,8 @@ class Search:
                         acts_on_spring(e) or follows_path(e) or (is_link(e) and not e.is_constant)
                         for e in model.effects),
                     model.constant_gain,
-                    sum(e.offset for e in model.effects if e.cause == offset))
+                    sum(e.offset for e in model.effects if e.cause == offset),
+                    any(acts_on_spring(e) or follows_path(e) for e in model.effects))
 
     @staticmethod
     def _open_core(fitted, own):

@@ -114,9 +114,10 @@ class Seen:
         return next(rounding_errors((self.measured - self.output) * self.used, self.output,
                                     self.used, self.found.step))
 
-    def at_stamps(self):
+    def at_stamps(self, even=True):
         """Values as they were recorded, where the fit counted samples, the simulated output at
-        their instants, and at the stamps that they carry, each of shape (m,)."""
+        their instants, and at the stamps that they carry, each of shape (m,); without a jump of
+        these if they are to be `even`."""
         topic = self.record.topics[1]
         stamped = self._place((topic.stamps_ns - topic.stamps_ns[0]) * 1e-9)
         if "sensor" in self.record.resampled:
@@ -125,11 +126,14 @@ class Seen:
             stamped + self.record.lag_s * self.record.sampling_rate_hz - topic.clock.slot)))
         # about the instants of their own clock: what runs away from the reference's is no scatter,
         # nor are few stamps that are far off
-        off = self.record.sampling_rate_hz * (topic.clock.even_s(topic.stamps_ns)
-                                              - topic.clock.instants_s(topic.stamps_ns))
+        stamps = topic.clock.even_s(topic.stamps_ns)
+        off = self.record.sampling_rate_hz * (stamps - topic.clock.instants_s(topic.stamps_ns))
         off = off - np.median(off)
         good = (slot >= 0) & (slot < len(self.output)) & (
             np.abs(off) <= _OF_SCATTER * topic.clock.scatter_s * self.record.sampling_rate_hz)
+        if not even:
+            off += self.record.sampling_rate_hz * (
+                1e-9 * (topic.stamps_ns - topic.stamps_ns[0]) - stamps)
         good[good] = self.used[slot[good].astype(int)]
         slot = slot[good].astype(int)
         return self.measured[slot], self.output[slot], self._output_at(slot + off[good])
@@ -268,7 +272,7 @@ def readings(engine, fitted, found, shown, wanted=lambda cls: True):
                     entry["part"]: entry["share"] for entry in engine.budget(fitted).parts
                     if entry["ci95"][0] > 0})
     for cause, cls in known_effects().items():
-        if not cls.read_off or not wanted(cls):
+        if not (cls.read_off or cause in shown) or not wanted(cls):
             continue
         recognised = cls.recognised(seen, shown.get(cause))
         if recognised is not None:

@@ -557,8 +557,9 @@ def _extended(engine, effects, stated):
     common = p.others.shown_by(p, effects).common(effects)
     axes = {name: p.axis_model(common, i) for i, name in enumerate(AXES)}
     axes[AXES[p.axis]] = own
-    axes = {name: AxisModel(axis.core, tuple(e for e in axis.effects if not e.of_reference))
+    axes = {name: AxisModel(axis.core, tuple(e.on_stamps() for e in axis.effects
+                                             if not e.of_reference))
             for name, axis in axes.items()}
-    return SensorModel(p.baseline.core, p.baseline.effects, axes,
+    return SensorModel(p.baseline.core, [e.on_stamps() for e in p.baseline.effects], axes,
                        {**p.baseline.metadata, **stated},
                        [effect for effect in own.effects if effect.of_reference])

@@ -68,7 +68,7 @@ _NORMAL = 1.4826
 
 
 class Jump(NamedTuple):
-    """Stamps that jump by less than a sampling interval while the samples go on evenly.
+    """Stamps that jump while the samples go on evenly.
 
     Attributes
     ----------
@@ -150,9 +150,9 @@ class Clock:
             slope, start = straight_line(slot, before)
             scatter = float(np.std(before - (slope * slot + start)))
             at = np.searchsorted(seconds, jump.at_s)
-            if slot[at] - slot[at - 1] == 1:
-                return cls("regular", float(1 / slope), float(start), slot, scatter, jump)
-            # samples may be lost there, or none: the stamps do not tell, but they do not scatter
+            # or samples may be lost there, or none: the stamps do not tell (`set_clock`)
+            return cls("regular", float(1 / slope), float(start), slot, scatter,
+                       jump if slot[at] - slot[at - 1] == 1 else None)
         return cls("regular", rate, float(np.median(place)) / rate, slot, scatter)
 
     def instants_s(self, stamps_ns):
@@ -160,6 +160,23 @@ class Clock:
         if self.kind == "uneven":
             return (stamps_ns - stamps_ns[0]) * 1e-9
         return self.start_s + self.slot / self.rate_hz
+
+    def without_gap(self, stamps_ns):
+        """The clock if none is lost in the longest gap between its samples, and the stamps jump
+        there; None where there is none, or too little on a side of it."""
+        lost = np.diff(self.slot) - 1
+        at = 1 + int(np.argmax(lost)) if len(lost) else 0
+        if self.kind != "regular" or not _ON_EACH_SIDE <= at <= len(self.slot) - _ON_EACH_SIDE \
+                or lost[at - 1] < 1:
+            return None
+        after = np.arange(len(self.slot)) >= at
+        slot = self.slot - lost[at - 1] * after
+        seconds = (stamps_ns - stamps_ns[0]) * 1e-9
+        columns = np.stack([slot, np.ones(len(slot)), after], axis=1)
+        (slope, start, size), *_ = np.linalg.lstsq(columns, seconds, rcond=None)
+        scatter = np.std(seconds - columns @ (slope, start, size))
+        return Clock("regular", float(1 / slope), float(start), slot, float(scatter),
+                     Jump(float(seconds[at]), float(size)))
 
     def even_s(self, stamps_ns):
         """Stamps [s] after the first of them, shape (n,), without a jump of theirs."""

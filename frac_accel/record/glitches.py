@@ -73,8 +73,8 @@ def glitches(reference, sensor, valid):
     # what is far beyond all else must not bend the filters by which it is found
     tame = [np.clip(values, -_WILD, _WILD) for values in pair]
     try:
-        taps = [_taps(tame[1 - to], tame[to], range(-_REACH, _REACH + 1)) for to in (0, 1)]
-        back, there = (pair[to] - _centred(pair[1 - to], taps[to]) for to in (0, 1))
+        taps = [filter_between(tame[1 - to], tame[to], range(-_REACH, _REACH + 1)) for to in (0, 1)]
+        back, there = (pair[to] - through(pair[1 - to], taps[to]) for to in (0, 1))
         alone = [_unsaid(values, of) for values, of in zip(pair, tame)]
     except LinAlgError:
         return []
@@ -112,10 +112,11 @@ def _goes_with(missed, faulty, rows, taps):
     samples."""
     around = slice(max(rows.start - _REACH, 0), rows.stop + _REACH)
     seen = missed[around]
-    fault, whole = (_centred(_only(values, rows, around), taps)[:len(seen)] for values in faulty)
-    share = np.sum(fault**2) / max(np.sum(whole**2), np.finfo(float).tiny)
+    fault, whole = (through(_only(values, rows, around), taps)[:len(seen)] for values in faulty)
+    power, of_all = np.sum(fault**2), np.sum(whole**2)
     leaves = np.sum((seen + fault)**2) / np.sum(seen**2)
-    return share > _PART and leaves < (_LEAVES_DEAD if share > _DEAD else _LEAVES)
+    return power > _PART * of_all \
+        and leaves < (_LEAVES_DEAD if power > _DEAD * of_all else _LEAVES)
 
 
 def _only(values, rows, around):
@@ -175,7 +176,7 @@ def _own(values, count):
     return own
 
 
-def _taps(values, target, lags):
+def filter_between(values, target, lags):
     """Filter of least squares from one signal to another, at successive lags."""
     return solve_toeplitz(_own(values, len(lags)), _shared(values, target, lags))
 
@@ -185,9 +186,9 @@ def _unsaid(values, tame):
     count = 2 * _NEIGHBOURS + 1
     # a row of the inverse covariance is the error of interpolation but for a factor
     inverse = solve_toeplitz(_own(tame, count), np.arange(count) == _NEIGHBOURS)
-    return _centred(values, inverse / inverse[_NEIGHBOURS])
+    return through(values, inverse / inverse[_NEIGHBOURS])
 
 
-def _centred(values, taps):
+def through(values, taps):
     """A signal behind a filter whose middle tap is without delay."""
     return np.convolve(values, taps)[len(taps) // 2:][:len(values)]

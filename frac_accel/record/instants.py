@@ -38,13 +38,22 @@ def put_on_instants(topic):
     share, std = _share_shown(values, slot, late)
     if not (share > _SHOWN and share > _SIGNIFICANT * std and abs(share - 1) < _ALL):
         return []
+    put_back(topic, late)
+    return [f"the {topic.name}'s samples were taken where their stamps say, which scatter by "
+            f"{clock.scatter_s:.3g} s (RMS): they are put on uniform instants"]
+
+
+def put_back(topic, late):
+    """Give a topic's samples, each taken so `late` [samples] after the instant of its clock that it
+    belongs to, the values of these instants."""
+    slot = (topic.clock.slot - topic.clock.slot[0]).astype(np.int64)
+    grid = np.arange(slot[-1] + 1)
+    values = np.stack([np.interp(grid, slot, axis) for axis in topic.values.T], axis=1)
     measured, place = topic.values, np.clip(slot + late, 0, grid[-1])
     for _ in range(_ROUNDS):
         spline = make_interp_spline(grid, values, _DEGREE)
         values[slot] += measured - spline(place)
-    topic.move(values[slot], late / clock.rate_hz)
-    return [f"the {topic.name}'s samples were taken where their stamps say, which scatter by "
-            f"{clock.scatter_s:.3g} s (RMS): they are put on uniform instants"]
+    topic.move(values[slot], late / topic.clock.rate_hz)
 
 
 def _share_shown(values, slot, late):

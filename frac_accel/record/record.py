@@ -6,7 +6,7 @@ import functools
 import numpy as np
 
 from ..errors import FracAccelError
-from ..model import AXES
+from ..model import AXES, AxisModel, SensorModel
 from .beyond import beyond
 from .clock import usable
 from .glitches import glitch_words, glitches, is_cut_off
@@ -17,6 +17,7 @@ from .ordering import in_order, late_words
 from .pairing import FEWEST, by_slots, by_stamps, same_clock, share_instants
 from .relation import clock_offset, refined
 from .resampling import filled, guessed, inner_filter
+from .set_clock import settle
 from .temperature import Temperature
 from .topic import Topic
 
@@ -245,6 +246,19 @@ class Record:
         """Lattice step of an axis of "reference" or "sensor" as published, or None."""
         return self._topics[name == "sensor"].step(column)
 
+    def as_laid_out(self, model):
+        """A model as it acts on these samples, which go on evenly where their stamps jump."""
+        jump = self.topics and self.topics[1].clock.jump
+        if not jump:
+            return model
+
+        def beside(effects):
+            return tuple(effect.beside_jump(jump) for effect in effects)
+        axes = {name: AxisModel(own.core, beside(own.effects))
+                for name, own in zip(AXES, model.axes)}
+        return SensorModel(model.core, beside(model.effects), axes, model.metadata,
+                           model.reference_faults)
+
     def integrity(self, column):
         """`Integrity` of an axis of the sensor."""
         found = self._topics[1].integrity(column, not self.is_on_other_instants("sensor"),
@@ -335,7 +349,9 @@ class Record:
         if offset is not None and _far(offset, one, two):
             taken_out = offset.seconds
             two.shift(-taken_out)
-        paired = by_slots(one, two) if same_clock(one, two) else by_stamps(one, two)
+        paired = _laid_out(one, two)
+        if settle(paired, two, words):
+            paired = _laid_out(one, two)
         stated = sensor.variance[:, column]
         std = np.sqrt(np.nanmean(stated)) if np.isfinite(stated).any() else np.nan
         valid = paired.valid
@@ -363,6 +379,10 @@ class Record:
                    offset and offset.std_s, taken_out, (*words, *paired.words), (one, two),
                    1e-9 * (paired.start_ns - int(two.stamps_ns[0])) + lag,
                    tuple(there[:last] for there in paired.present))
+
+
+def _laid_out(one, two):
+    return by_slots(one, two) if same_clock(one, two) else by_stamps(one, two)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -46,6 +46,8 @@ class Integrity:
         Whether the stamps scatter by no more than their own rounding makes.
     reference_noise : budget.reference_noise.ReferenceNoise or None
         Of the other topic, where the two together show it.
+    jump : clock.Jump or None
+        Of the stamps, which has been undone.
     """
 
     samples: int
@@ -60,6 +62,7 @@ class Integrity:
     words: list
     rounds_stamps: bool = False
     reference_noise: object = None
+    jump: object = None
 
     @property
     def dropped_fraction(self):
@@ -222,7 +225,7 @@ class Topic:
             step = None
         return Integrity(len(self), missing, self.duplicates,
                          self.stamps_back, self.not_finite, jitter, step, lower, upper, words,
-                         bool(jitter and self.rounded_to_s))
+                         bool(jitter and self.rounded_to_s), jump=clock.jump)
 
     def _stamp_words(self, jitter, missing):
         words, clock = [], self.clock

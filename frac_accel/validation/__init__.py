@@ -385,6 +385,7 @@ def _simulated(model, pair, column, temperature_at, back):
     if pair.is_on_other_instants("sensor"):
         # these values lie on no lattice, and would only be rounded once more
         model = _without_stage(model, QUANTIZATION)
+    model = pair.as_laid_out(model)
     inside, edge = pair.valid.copy(), min(EDGE, len(pair) // 16)
     inside[:edge] = inside[len(pair) - edge:] = False
     own = model.axis(AXES[column])

@@ -100,6 +100,38 @@ def test_a_cross_axis_sensitivity_is_no_turn(shares):
         assert [f.cause for f in diagnosis.findings] == ["cross_axis_sensitivity"]
 
 
+def behind_play(motion, gap):
+    """What play of this whole width leaves of a motion, shape (n,)."""
+    out, at = np.empty(len(motion)), 0.0
+    for i, here in enumerate(motion):
+        at = min(max(at, here - gap / 2), here + gap / 2)
+        out[i] = at
+    return out
+
+
+@pytest.mark.parametrize("mixed", ["misalignment", "cross_axis_sensitivity"])
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.thorough),
+                                  pytest.param(1, marks=[pytest.mark.thorough, pytest.mark.long])])
+def test_of_one_axis_its_play_tells_a_turn_from_a_cross_axis_sensitivity(mixed, seed):
+    rng = np.random.default_rng([19, seed])
+    sines, fine = [Multisine(rng, band_hz=(1.0, 60.0)) for _ in range(3)], 16
+    t = np.arange(fine * N) / (fine * RATE)
+    output = np.stack([sine.motion(t) for sine in sines], axis=1)
+    pitch, yaw = rng.uniform(3, 7, 2) * rng.choice([-1, 1], 2)
+    if mixed == "misalignment":
+        seen = behind_play(turned(output, 0.0, pitch, yaw)[:, 0], 0.5)
+    else:
+        seen = behind_play(output[:, 0], 0.5) + output[:, 1:] @ np.radians([yaw, pitch])
+    reference = np.stack([sine.acceleration(t) for sine in sines], axis=1)[::fine]
+    values = np.outer(seen[::fine] + 0.002 * rng.normal(size=N), [1, 0, 0])
+    diagnosis = found(times(N / RATE), reference, values)
+    assert {finding.cause for finding in diagnosis.findings} == {mixed, "backlash"}
+    effect = next(f.effect for f in diagnosis.findings if f.cause == mixed)
+    assert ((effect.pitch_deg, effect.yaw_deg) == pytest.approx((pitch, yaw), abs=0.05)
+            if mixed == "misalignment" else
+            (effect.y, effect.z) == pytest.approx(np.radians([yaw, pitch]), abs=0.002))
+
+
 def test_exchanged_axes_are_said_in_words():
     effect = model({"cause": "misalignment", "yaw_deg": 90.0}).axes[0].effects[0]
     assert "the sensor's x is the reference's y" in effect.explanation

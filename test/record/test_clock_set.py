@@ -57,11 +57,11 @@ def test_a_jump_across_lost_samples_is_no_scatter(seed):
 
 @pytest.mark.parametrize("slower", [1.6, 1.0])
 @pytest.mark.parametrize("seed", range(2))
-def test_no_cause_is_invented_for_it(seed, slower):
+def test_it_has_its_name_and_nothing_else(seed, slower):
     """It was `timestamp_jitter`, with a skew and a delay that undo each other; beside a reference
     of the same rate, a delay."""
     rng = np.random.default_rng([123, seed])
-    stamps, _, _ = stamped(rng, 0.0)
+    stamps, _, size = stamped(rng, 0.0)
     fine = np.arange(COUNT * 20 + 400) / (20 * RATE)
     motion = sosfiltfilt(butter(3, (0.5, 20.0), "band", fs=20 * RATE, output="sos"),
                          rng.normal(size=len(fine)))
@@ -72,7 +72,9 @@ def test_no_cause_is_invented_for_it(seed, slower):
     sensor = motion(taken) + 0.005 * rng.normal(size=COUNT)
     found = diagnose((reference, Samples.of(stamps, np.outer(sensor, [1.0, 0, 0]))),
                      SensorModel(Gain(1.0)))
-    assert found.findings == [] and found.verdict == "consistent"
+    assert [finding.cause for finding in found.findings] == ["time_step"]
+    assert found.findings[0].effect.step_s == pytest.approx(size, abs=3e-9)
+    assert found.verdict == "explained"
     assert any("their clock was set" in words for words in found.integrity.words)
 
 

@@ -23,12 +23,8 @@ def turn_of(view):
     shares of the others are no turn, as they may as well be its cross-axis sensitivity; unless its
     own share has lost just what a turn takes from it.
     """
-    if view.mixing is None:
-        return None
-    shares, stds = view.mixing
-    moving = [axis for axis in range(3) if view.excited[_AXES[axis]]]
-    own = _AXES.index(view.axis)
-    if len(moving) < 2 or own not in moving:
+    shares, stds, moving, own = _shares(view)
+    if moving is None:
         return None
     block = shares[np.ix_(moving, moving)]
     apart = ~np.eye(len(moving), dtype=bool)
@@ -52,6 +48,25 @@ def turn_of(view):
             return None
         turned = _shortest_turn(own, row / np.linalg.norm(row))
     return _angles(turned.T)
+
+
+def small_turn_of(view):
+    """The same of the only axis that was measured, whatever else its shares may be; or None."""
+    shares, _, moving, own = _shares(view)
+    if moving is None or np.isfinite(np.delete(shares, own, axis=0)).any():
+        return None
+    row = np.nan_to_num(shares[own])
+    return _angles(_shortest_turn(own, row / np.linalg.norm(row)).T) if row[own] > 0 else None
+
+
+def _shares(view):
+    """Shares, their standard uncertainties, axes that move, and the one that is asked for; all None
+    where no other one moves."""
+    moving = [axis for axis in range(3) if view.excited[_AXES[axis]]]
+    own = _AXES.index(view.axis)
+    if view.mixing is None or len(moving) < 2 or own not in moving:
+        return (None,) * 4
+    return (*view.mixing, moving, own)
 
 
 def _keeps_length(row, std, own):

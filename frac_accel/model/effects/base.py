@@ -304,6 +304,15 @@ class Effect:
         """
         return None
 
+    def beside_jump(self, jump):
+        """This effect on samples that were laid out evenly though their stamps jump
+        (`record.clock.Jump`)."""
+        return self
+
+    def on_stamps(self):
+        """The same on samples that have their stamps."""
+        return self
+
     def spoiled(self, measured):
         """Mask, shape (n,): samples that because of this effect say nothing of any other."""
         return np.zeros(len(measured), bool)
@@ -510,9 +519,10 @@ class Effect:
         return self.stage == CROSS_AXIS
 
     def share_of_axes(self, axis):
-        """Share of each axis, shape (3,), in an axis (0, 1, 2), itself included, of effects that mix
-        the axes: of the base's acceleration in that along the sensor's axis at the stage of a turn,
-        of the axes' outputs at that of cross-axis sensitivity.
+        """Share of each axis, shape (3,), in an axis (0, 1, 2), itself included.
+
+        Of effects that mix the axes: at the stage of a turn the acceleration of the base, at that
+        of a cross-axis sensitivity the axes' outputs.
         """
         return np.eye(3)[axis]
 

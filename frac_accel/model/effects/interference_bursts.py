@@ -181,9 +181,9 @@ def _follows(inside, error, output, count):
     stretches, samples = count / inside.mean(), max(inside.sum() / _WINDOW, count)
     moving = output - output.mean()
     for values in (moving, slope, bend):
-        # bursts at any time meet any size of the motion
+        # bursts at any time meet any size of the motion: turns and stops are no time of their own
         size = rankdata(np.abs(values)) / len(values)
-        if size[inside].mean() > 0.5 + _DEVIATIONS / np.sqrt(12 * count):
+        if abs(size[inside].mean() - 0.5) > _DEVIATIONS / np.sqrt(12 * count):
             return True
         if abs(np.corrcoef(values**2, inside)[0, 1]) > _allowed(stretches) \
                 or _meets_the_motion(inside, values**2):

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from ..parameters import parameter
-from .axis_turn import turn_of
+from .axis_turn import small_turn_of, turn_of
 from .base import TURN, Effect
 from .fit_starts import Start, finite
 
@@ -131,9 +131,12 @@ class Misalignment(Effect):
     @classmethod
     def starts(cls, view):
         turn = turn_of(view)
+        starts = [] if turn is None else [finite(cls(*turn))]
+        if turn is None and view.is_bent:
+            # what a bent axis makes of the others' motion tells a turn from what comes across
+            turn = small_turn_of(view)
         if turn is None:
             return []
-        starts = [finite(cls(*turn))]
         if max(map(abs, turn)) < _LARGE_DEG:
             # as the axis itself shows it: by the others it is bent by what only they have
             angles = cls.fitted_parameters(view.axis, view.excited)
