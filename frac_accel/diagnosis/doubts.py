@@ -13,6 +13,7 @@ from .courses import with_level
 from .engine import LONG, WEIGHS
 from .gradual import gradual
 from .in_bands import otherwise_in_bands
+from .late_reference import is_reference_late, leads
 from .names import cancelling, undetermined
 from .problem import WRONG_BY_STEPS, Problem, acts_on_spring, follows_path
 from .search import acts_as_filter
@@ -950,7 +951,8 @@ def within_own_delay(engine, best, effect):
         return ""
     own = own_delay_s(core)
     if effect.of_reference:
-        return "" if p.record.is_reference_late or abs(-delay - own) > _JUST_BACK * own else \
+        return "" if abs(-delay - own) > _JUST_BACK * own \
+            or is_reference_late(p, best.effects) else \
             (f"a lead of {-delay:.3g} s beside a core whose own delay is {own:.3g} s: a filter "
              "that delays nothing, such as a centred mean, does the same")
     if 0 > delay >= -_TAKEN_BACK * own:
@@ -998,25 +1000,30 @@ def _acausal(engine, best, stds):
            if cause not in engine.search.base and not effect.everyday
            and type(effect).change_core is not Effect.change_core]
     if odd and delay < 0 and -delay > max(_ACAUSAL * std, 0.5 / p.rate):
-        leads = [cause for cause in own if best.effects[cause].pure_delay_s() < 0]
-        if leads:
-            return dict.fromkeys([*leads, *odd], f"a lead of {-delay:.3g} s beside another core: "
+        leading = [cause for cause in own if best.effects[cause].pure_delay_s() < 0]
+        if leading:
+            return dict.fromkeys([*leading, *odd], f"a lead of {-delay:.3g} s beside another core: "
                                  "no sensor has it; they imitate something else")
-    ahead = {cause: words for cause in links
-             if (words := within_own_delay(engine, best, best.effects[cause]))}
-    if ahead:
-        return ahead
-    # the reference's delay is a lead of the sensor
-    late = {cause: -effect.pure_delay_s() for cause, effect in links.items()
-            if effect.of_reference and effect.pure_delay_s() < 0}
-    lead = max(late.values(), default=0.0)
+    within = {cause: words for cause in links
+              if (words := within_own_delay(engine, best, best.effects[cause]))}
+    if within:
+        return within
+    # the reference's delay is a lead of the sensor, and so is a delay of its own below zero
+    ahead = {cause: -effect.pure_delay_s() for cause, effect in best.effects.items()
+             if effect.pure_delay_s() < 0}
+    late = {cause: lead for cause, lead in ahead.items()
+            if cause in links and links[cause].of_reference}
+    lead = max(ahead.values(), default=0.0)
     # a digital filter of some samples delays by less than the one of its length in continuous time
     # and a clear peak is no smooth filter's
-    own = [cause for cause in own if not 0 < _damping(best.effects[cause]) < _CLEAR_PEAK]
+    own = [cause for cause in own if cause not in ahead
+           and not 0 < _damping(best.effects[cause]) < _CLEAR_PEAK]
     strange = [cause for cause in own if not best.effects[cause].everyday
                and not lead < min(best.effects[cause].pure_delay_s(), 1 / p.rate)]
-    if late and strange and not p.record.is_reference_late:
-        return dict.fromkeys([*late, *strange], f"a lead of {lead:.3g} s, which only a fit beside "
+    # a high-pass has nothing that a lead would take back, where another filter has
+    strange = [cause for cause in strange if not leads(best.effects[cause])] or strange
+    if ahead and strange and not is_reference_late(p, best.effects):
+        return dict.fromkeys([*ahead, *strange], f"a lead of {lead:.3g} s, which only a fit beside "
                              "a filter shows: together they imitate something else")
     return {cause: f"a lead of {lead:.3g} s beside a filter, less than a sampling interval: a "
                    "digital filter has one of its own"

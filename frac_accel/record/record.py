@@ -225,7 +225,11 @@ class Record:
     def is_reference_late(self):
         """Whether the sensor shows the motion clearly before the reference does."""
         return self.offset_s is not None and not self.taken_out_s \
-            and _is_lead(self.offset_s, self.offset_std_s)
+            and self.is_reference_late_by(self.offset_s)
+
+    def is_reference_late_by(self, offset_s):
+        """Whether such an offset, as sure as the record's, is clearly one of a late reference."""
+        return _is_lead(offset_s, self.offset_std_s)
 
     @functools.cached_property
     def _topics(self):

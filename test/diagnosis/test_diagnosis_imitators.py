@@ -1,11 +1,12 @@
 """Two filters that imitate one which is simpler, and two that are there."""
 
 import numpy as np
+import pytest
 from sampled_pair import sampled_pair
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import bilinear, butter, lfilter, sosfilt, sosfiltfilt
 
-from frac_accel import SensorModel
+from frac_accel import Samples, SensorModel, diagnose
 from frac_accel.diagnosis.doubts import _another_alone
 from frac_accel.diagnosis.engine import Engine
 from frac_accel.model.core import Gain
@@ -50,3 +51,21 @@ def test_two_filters_that_are_there_are_not():
         ringing = lfilter(*bilinear([0.3 * omega**2], [1, 0.1 * omega, omega**2], fine), motion)
         return uniform_filter1d(0.7 * motion + ringing, 15)
     assert not doubted(engine_of(sensor), EFFECTS["second_resonance"](200.0, 0.05, 0.3))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_of_the_reference_is_no_filter_where_stamps_scatter(seed):
+    """A mean of 7 to 21 samples keeps it from the output; its lag was taken back by the delay that
+    such stamps leave open, and called a late reference."""
+    rng, n = np.random.default_rng([43, seed]), 700
+    motion = sosfiltfilt(butter(1, 0.01, fs=1.0, output="sos"),
+                         np.cumsum(rng.normal(size=4 * n)))[n:2 * n]
+    motion = 16 * (motion - motion.mean()) / motion.std()
+    noisy = motion + 0.06 * rng.normal(size=n)
+    for at in rng.choice(n, 40, replace=False):
+        noisy[at] += rng.normal() * rng.choice([1, 1, 1, 4])
+    stamps = 1e9 * np.arange(n)
+    found = diagnose(tuple(Samples.of(np.round(at), np.outer(values, [1, 0, 0])) for at, values in (
+        (stamps, noisy), (stamps + 3e5 * rng.normal(size=n) + 1e6,
+                          motion + 0.05 * rng.normal(size=n)))), SensorModel(Gain(1.0)))
+    assert found.findings == []
