@@ -79,6 +79,17 @@ def test_recognised_and_nothing_else(cause, truth, seed):
     assert findings[cause].gain.reduction > 0.1
 
 
+@pytest.mark.parametrize("seed", [1, 3, 0, 2, 4])
+def test_instants_that_scatter_by_a_fifth_of_an_interval(seed):
+    """What the next order takes from the slope's power left less than none of some samples'."""
+    rng, t = np.random.default_rng([61, seed]), times(12.0)
+    sine, rms_s = Multisine(rng, band_hz=(1.0, 200.0)), rng.uniform(0.15, 0.25) / RATE
+    values = sine.motion(t + rms_s * rng.normal(size=len(t))) + 5e-4 * rng.normal(size=len(t))
+    named = diagnose((samples(t, sine.acceleration(t)), samples(t, values)), model()).findings
+    assert [finding.cause for finding in named] == ["sampling_jitter"]
+    assert abs(named[0].effect.rms_s - rms_s) < 4 * named[0].std["rms_s"] < 0.2 * rms_s
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_bursts_keep_what_a_filter_to_a_band_takes(seed):
     """Beside a reference of another rate they had 0.72 to 0.80 of their RMS, by 8 to 12 standard

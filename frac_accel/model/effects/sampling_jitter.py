@@ -18,6 +18,8 @@ _SHARE, _ALL = 0.05, 1.25
 # Periods of the motion over which its power is averaged: what follows that as well as the slope at
 # each instant is noise that grows with the motion.
 _PERIODS = (1, 4, 16)
+# Share of what the slope alone says of the error's power that is left at least by the next order.
+_STILL = 0.1
 # Share of the scatter by which it may be open.
 _OPEN_BY = 0.5
 # Share of samples that repeat the one before while the signal moves on, from which they are what
@@ -78,7 +80,8 @@ class SamplingJitter(Effect):
             return None
         # of the next order: a normal shift to the power of four is three times its variance's
         # square on average
-        both = of_slope + factor * of_errors(0.75 * bend**2 + slope * slope_of(bend))
+        both = np.maximum(of_slope + factor * of_errors(0.75 * bend**2 + slope * slope_of(bend)),
+                          _STILL * of_slope)
         noise, factor, std = variance_law(error, both)
         power = noise + factor * both
         if not all(follows(error, power, square) for square in (of_slope, of_level)):
