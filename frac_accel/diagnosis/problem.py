@@ -366,12 +366,11 @@ class Problem:
 
     def joined(self, effects, cause, effect):
         """Change of the output, shape (n,), when a cause joins others, for a screening: to first
-        order, but for a force that holds the mass beside no other. Where that hardly moves
-        otherwise a first order says nothing, and the force is simulated."""
-        if not any(map(acts_on_spring, effects.values())) \
-                and _holds(effect, self.axis_model(effects)):
+        order, but for a force that holds the mass. Where that hardly moves otherwise, or turns
+        within few samples, a first order says nothing, and the force is simulated."""
+        if _holds(effect, self.axis_model(effects)):
             return self.simulate({**effects, cause: effect}, steps=_STEPS_OF_SLOPES) \
-                - self._remembered(effects, True)
+                - self._remembered(effects, True, _STEPS_OF_SLOPES)
         return self.change(effects, cause, effect, not self._hardly_crossed(effects))
 
     def _hardly_crossed(self, effects):
