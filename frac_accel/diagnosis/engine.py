@@ -233,6 +233,8 @@ class Engine:
                            and not fit.causes & unwanted),
                           key=lambda fit: self.score(fit, variance))
             winner = self._ahead_in_colour(near, self._general(near, variance), variance)
+            winner = next((fit for fit in near if _is_plainer(fit, winner) and self.score(
+                fit, variance) < self.score(winner, variance) + _CLOSE), winner)
             if winner is best:
                 return best
             best = winner
@@ -358,8 +360,9 @@ class Engine:
                  self.search.fits.values()
                  if cause not in fit.causes and len(fit.causes) <= len(best.causes)]
         # a hollow one that is close says the same in other words
-        return [entry for entry in sorted(found, key=lambda entry: entry[0])
-                if entry[0] > close or not self.hollow(self.search.fits[entry[1]])]
+        return [(margin, causes) for margin, causes in sorted(found, key=lambda entry: entry[0])
+                if margin > close or not (self.hollow(self.search.fits[causes])
+                                          or _is_plainer(best, self.search.fits[causes]))]
 
     def margin_of_all(self, best, cause):
         """Margin by which a set is ahead of one that leaves twice the power; what is left and is no
@@ -829,6 +832,12 @@ class Engine:
 def _unless_it_grows(left):
     """A `Leftover` without what only comes and goes with the motion."""
     return dataclasses.replace(left, level_score=0.0)
+
+
+def _is_plainer(fit, other):
+    """Whether a set says by shares of the other axes alone what another one says by a turn."""
+    return mixes_otherwise(fit, other) and any(
+        fit.effects[cause].describes == "across" for cause in fit.causes - other.causes)
 
 
 def _once(store, fitted, make):
