@@ -21,6 +21,9 @@ _BY_ROUNDING = 1.1
 # one would have in it, at least, to tell; share of them that it may have. Share of the rate from
 # which a single sample tells.
 _EDGE, _TELLS, _EMPTY, _AS_FAST = 0.5, 2.5, 0.1, 0.9
+# Time [s] within which the stamps of two topics jump together, and share by which their jumps may
+# differ.
+_TOGETHER_S, _SAME_JUMP = 1.0, 0.1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -202,6 +205,16 @@ class Topic:
         empty = together | (last - first < _EMPTY * expected) & (expected > _TELLS)
         return int(np.sum(np.diff(slot)[gaps][empty] - 1))
 
+    def jumps_with(self, other):
+        """Whether the stamps of another topic jump as this one's do: one clock has stamped both."""
+        jumps = self.clock.jump, other.clock.jump
+        if None in jumps:
+            return False
+        apart_s = 1e-9 * int(self.stamps_ns[0] - other.stamps_ns[0]) \
+            + jumps[0].at_s - jumps[1].at_s
+        return abs(apart_s) < _TOGETHER_S + abs(jumps[0].size_s) \
+            and abs(jumps[0].size_s - jumps[1].size_s) < _SAME_JUMP * abs(jumps[0].size_s)
+
     def integrity(self, column, own_instants=True, other=None):
         """`Integrity` of one axis; of values on other instants, what still holds of them; of what
         is missing, what the `other` topic has."""
@@ -225,7 +238,8 @@ class Topic:
             step = None
         return Integrity(len(self), missing, self.duplicates,
                          self.stamps_back, self.not_finite, jitter, step, lower, upper, words,
-                         bool(jitter and self.rounded_to_s), jump=clock.jump)
+                         bool(jitter and self.rounded_to_s),
+                         jump=None if other is not None and self.jumps_with(other) else clock.jump)
 
     def _stamp_words(self, jitter, missing):
         words, clock = [], self.clock

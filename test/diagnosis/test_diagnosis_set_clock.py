@@ -79,3 +79,17 @@ def test_stamps_that_are_true_set_no_clock(pause):
     assert {finding.cause for finding in found.findings} <= {"dropped_samples"}
     assert found.extended["nrmse"] < 0.02
     assert any("begin anew, 0.3 of an interval after" in words for words in found.integrity.words)
+
+
+@pytest.mark.parametrize("step", [0.3, -0.4])
+def test_a_clock_that_stamps_both_makes_nothing_late(step):
+    pair, *_ = recorded(np.random.default_rng(9), step)
+    stamps = pair[1].stamps_ns
+    for other in (stamps, stamps + 700_000):  # with its own instants, too
+        reference = pair[0]._replace(stamps_ns=other[:len(pair[0].stamps_ns)])
+        if other is not stamps:
+            sine = Multisine(np.random.default_rng(9))
+            reference = reference._replace(values=np.outer(
+                sine.acceleration(np.arange(N) / RATE + 7e-4), [1, 0, 0]))
+        found = diagnose((reference, pair[1]), model())
+        assert [finding.cause for finding in found.findings] == []
