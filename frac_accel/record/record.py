@@ -269,6 +269,9 @@ class Record:
                                           self._topics[0])
         found.words.extend([*self.words, *gravity_words(self.reference[self.valid],
                                                        self.sensor[self.valid])])
+        one, two = self._topics
+        if one.clock.jump and not two.jumps_with(one):
+            found.words.append(f"the reference's {one.jump_words}")
         step = self.step("reference", column)
         if step and step > _COARSE * np.std(self.reference[:, column]):
             found.words.append(f"the reference's values are multiples of {step:.6g}{_in_g(step)}")

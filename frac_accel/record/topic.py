@@ -205,6 +205,13 @@ class Topic:
         empty = together | (last - first < _EMPTY * expected) & (expected > _TELLS)
         return int(np.sum(np.diff(slot)[gaps][empty] - 1))
 
+    @property
+    def jump_words(self):
+        """Words on a jump of its stamps that has been undone."""
+        jump = self.clock.jump
+        return (f"stamps jump by {1e3 * jump.size_s:.4g} ms at {jump.at_s:.6g} s while the samples "
+                "go on evenly: their clock was set")
+
     def jumps_with(self, other):
         """Whether the stamps of another topic jump as this one's do: one clock has stamped both."""
         jumps = self.clock.jump, other.clock.jump
@@ -260,9 +267,7 @@ class Topic:
             words.append(f"the samples come in batches: their instants are taken as uniform at "
                          f"{clock.rate_hz:.6g} Hz")
         if clock.jump:
-            words.append(f"{clock.jump.at_s:.6g} s after the start the stamps jump by "
-                         f"{1e3 * clock.jump.size_s:.4g} ms while the samples go on evenly: "
-                         "their clock was set")
+            words.append(f"the {self.jump_words}")
         if jitter:
             unit = f"are multiples of {self.rounded_to_s:.3g} s, and " if self.rounded_to_s else ""
             words.append(f"the stamps {unit}scatter by {jitter:.3g} s (RMS), "

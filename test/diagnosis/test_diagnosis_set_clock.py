@@ -93,3 +93,12 @@ def test_a_clock_that_stamps_both_makes_nothing_late(step):
                 sine.acceleration(np.arange(N) / RATE + 7e-4), [1, 0, 0]))
         found = diagnose((reference, pair[1]), model())
         assert [finding.cause for finding in found.findings] == []
+
+
+def test_a_reference_whose_clock_was_set_is_told():
+    (reference, sensor), *_ = recorded(np.random.default_rng(10), 0.0)
+    stamps = reference.stamps_ns + np.where(np.arange(N) < 2500, 0, 600_000)
+    found = diagnose((reference._replace(stamps_ns=stamps), sensor), model())
+    assert found.findings == []
+    assert any("the reference's stamps jump by 0.6 ms at 5.0006 s" in words
+               for words in found.integrity.words)
