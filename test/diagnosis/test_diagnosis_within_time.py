@@ -124,7 +124,8 @@ def test_two_sets_that_only_mix_the_axes_otherwise_are_one_that_grows():
     search = searched(4, None)
     small = {"cross_axis_sensitivity": EFFECTS["cross_axis_sensitivity"](0, 0.1)}, \
         {"misalignment": EFFECTS["misalignment"](0.0, 0.0, -6.0)}
-    begun = {**sets()[0], **sets()[2]}
+    # a filter of one axis would tell them apart
+    begun = sets()[2]
     crossed, turned, plain = (search.fit({**begun, **more}) for more in (*small, {}))
     search.problem.limit = Clock()
     assert search._say_the_same(crossed, turned)
