@@ -310,6 +310,7 @@ class Search:
         celsius = p.record.temperature_c
         delay, offset = (IDENTIFIED[name].cause for name in ("delay_s", "offset"))
         own = p.baseline.axis(p.axis).core
+        is_bent = any(acts_on_spring(e) or follows_path(e) for e in model.effects)
         return View(p.rate, p.time, p.measured, fitted.simulated, fitted.residual, p.used,
                     model.effective_core, p.record.since_start_s,
                     sum(e.delay_s for e in model.effects if e.cause == delay),
@@ -320,12 +321,11 @@ class Search:
                     "xyz"[p.axis],
                     p.mixing(fitted.effects),
                     self._open_core(fitted, own),
-                    isinstance(own, Oscillator) and not any(
-                        acts_on_spring(e) or follows_path(e) or (is_link(e) and not e.is_constant)
-                        for e in model.effects),
+                    isinstance(own, Oscillator) and not is_bent and not any(
+                        is_link(e) and not e.is_constant for e in model.effects),
                     model.constant_gain,
                     sum(e.offset for e in model.effects if e.cause == offset),
-                    any(acts_on_spring(e) or follows_path(e) for e in model.effects))
+                    is_bent)
 
     @staticmethod
     def _open_core(fitted, own):

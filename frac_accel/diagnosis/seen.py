@@ -119,7 +119,8 @@ class Seen:
         their instants, and at the stamps that they carry, each of shape (m,); without a jump of
         these if they are to be `even`."""
         topic = self.record.topics[1]
-        stamped = self._place((topic.stamps_ns - topic.stamps_ns[0]) * 1e-9)
+        seconds = (topic.stamps_ns - topic.stamps_ns[0]) * 1e-9
+        stamped = self._place(seconds)
         if "sensor" in self.record.resampled:
             return self._beside(stamped)
         slot = (topic.clock.slot + np.round(np.median(
@@ -132,8 +133,7 @@ class Seen:
         good = (slot >= 0) & (slot < len(self.output)) & (
             np.abs(off) <= _OF_SCATTER * topic.clock.scatter_s * self.record.sampling_rate_hz)
         if not even:
-            off += self.record.sampling_rate_hz * (
-                1e-9 * (topic.stamps_ns - topic.stamps_ns[0]) - stamps)
+            off += self.record.sampling_rate_hz * (seconds - stamps)
         good[good] = self.used[slot[good].astype(int)]
         slot = slot[good].astype(int)
         return self.measured[slot], self.output[slot], self._output_at(slot + off[good])

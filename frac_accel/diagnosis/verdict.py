@@ -278,7 +278,8 @@ def _told(engine, likely, named, described, found):
                                         described.output)
     own = {f.cause: f.effect for f in findings}
     effects, late = _of_reference(engine, {**fitted.effects, **own, **described.effects}, own)
-    model = _extended(engine, effects, _stated(p, fitted, after / account.spread))
+    others = p.others.shown_by(p, effects)
+    model = _extended(engine, effects, others, _stated(p, fitted, after / account.spread))
     left, fraction = named.left, named.fraction
     counts_as_noise = verdict in ("explained", "undecided") and named.may_be_noise
     if counts_as_noise:
@@ -292,7 +293,6 @@ def _told(engine, likely, named, described, found):
     at_limit = engine.at_limit if any(f.effect.read_off for f in findings) else None
     rest = engine.budget_shown(fitted, at_limit) if output is None else \
         engine.budget_between(p.recorded, output, p.record.valid)
-    others = p.others.shown_by(p, effects)
     findings = [_beside_unseen_core(others.said(f), delay_of_unseen_core(engine, fitted))
                 for f in findings]
     more = [*engine.words_of_budget, *(noise.words if noise.rms is None else ())]
@@ -550,11 +550,12 @@ def _ahead(problem, effects, named):
     return ahead_words(problem.record.lag_s - sum(delays.values()) - own, problem.rate)
 
 
-def _extended(engine, effects, stated):
-    """The model in use with these causes on the diagnosed axis, and what is stated of it."""
+def _extended(engine, effects, others, stated):
+    """The model in use with these causes on the diagnosed axis, what others (`OtherAxes`) have of
+    them, and what is stated of it."""
     p = engine.problem
     own = p.axis_model(effects)
-    common = p.others.shown_by(p, effects).common(effects)
+    common = others.common(effects)
     axes = {name: p.axis_model(common, i) for i, name in enumerate(AXES)}
     axes[AXES[p.axis]] = own
     axes = {name: AxisModel(axis.core, tuple(e.on_stamps() for e in axis.effects

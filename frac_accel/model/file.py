@@ -17,7 +17,7 @@ from ..io.regular_file import open_regular
 from .core import CORES, Arx, Oscillator
 from .core.static_force import StaticForce
 from .effects import Circumstances, Effect, effect_names, effect_of
-from .effects.axis_mixing import mix
+from .effects.axis_mixing import mix, mixed_by
 from .effects.base import TURN
 from .parameters import as_mapping, build, number, parameter_fields, plain
 
@@ -63,11 +63,7 @@ class AxisModel:
     def base_shares(self, axis):
         """Share of each of the reference's axes, shape (3,), in the acceleration along this one,
         `axis` (0, 1, 2)."""
-        shares = np.eye(3)[axis]
-        for effect in self.effects[::-1]:
-            if effect.stage == TURN:
-                shares = shares @ np.stack([effect.share_of_axes(i) for i in range(3)])
-        return shares
+        return mixed_by(effect for effect in self.effects if effect.stage == TURN)[axis]
 
     def base_gain(self, time_s):
         """Gain of the base's acceleration before the core at times since the record's start."""

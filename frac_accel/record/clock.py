@@ -150,7 +150,7 @@ class Clock:
             slope, start = straight_line(slot, before)
             scatter = float(np.std(before - (slope * slot + start)))
             at = np.searchsorted(seconds, jump.at_s)
-            # or samples may be lost there, or none: the stamps do not tell (`set_clock`)
+            # across a gap samples may be lost, or none: the stamps do not tell (`set_clock`)
             return cls("regular", float(1 / slope), float(start), slot, scatter,
                        jump if slot[at] - slot[at - 1] == 1 else None)
         return cls("regular", rate, float(np.median(place)) / rate, slot, scatter)

@@ -30,11 +30,9 @@ def put_on_instants(topic):
     clock = topic.clock
     if clock.kind != "regular" or not topic.scatters or len(topic) < 100 * _NEIGHBOURS:
         return []
-    slot = (clock.slot - clock.slot[0]).astype(np.int64)
+    slot, _, values = _bridged(topic)
     seconds = (topic.stamps_ns - topic.stamps_ns[0]) * 1e-9
     late = (seconds - clock.instants_s(topic.stamps_ns)) * clock.rate_hz
-    grid = np.arange(slot[-1] + 1)
-    values = np.stack([np.interp(grid, slot, axis) for axis in topic.values.T], axis=1)
     share, std = _share_shown(values, slot, late)
     if not (share > _SHOWN and share > _SIGNIFICANT * std and abs(share - 1) < _ALL):
         return []
@@ -46,14 +44,20 @@ def put_on_instants(topic):
 def put_back(topic, late):
     """Give a topic's samples, each taken so `late` [samples] after the instant of its clock that it
     belongs to, the values of these instants."""
-    slot = (topic.clock.slot - topic.clock.slot[0]).astype(np.int64)
-    grid = np.arange(slot[-1] + 1)
-    values = np.stack([np.interp(grid, slot, axis) for axis in topic.values.T], axis=1)
+    slot, grid, values = _bridged(topic)
     measured, place = topic.values, np.clip(slot + late, 0, grid[-1])
     for _ in range(_ROUNDS):
         spline = make_interp_spline(grid, values, _DEGREE)
         values[slot] += measured - spline(place)
     topic.move(values[slot], late / topic.clock.rate_hz)
+
+
+def _bridged(topic):
+    """Instants of the samples from the first on, all instants, and the values at these, on straight
+    lines where a sample is missing."""
+    slot = (topic.clock.slot - topic.clock.slot[0]).astype(np.int64)
+    grid = np.arange(slot[-1] + 1)
+    return slot, grid, np.stack([np.interp(grid, slot, axis) for axis in topic.values.T], axis=1)
 
 
 def _share_shown(values, slot, late):

@@ -19,6 +19,14 @@ def mixing_matrix(by_axis):
     return matrix
 
 
+def mixed_by(effects):
+    """The same of some effects one after the other, as one axis has them."""
+    matrix = np.eye(3)
+    for effect in effects:
+        matrix = np.stack([effect.share_of_axes(i) for i in range(3)]) @ matrix
+    return matrix
+
+
 def turn_back(axes, axis):
     """Matrix that turns samples of three axes into the reference's, where one axis is, by its
     effects, mostly another one of the reference or the opposite of its own; otherwise None.
@@ -28,10 +36,7 @@ def turn_back(axes, axis):
     axes : sequence of AxisModel
     axis : {0, 1, 2}
     """
-    matrix = np.eye(3)
-    for effect in axes[axis].effects:
-        if effect.mixes_axes:
-            matrix = np.stack([effect.share_of_axes(i) for i in range(3)]) @ matrix
+    matrix = mixed_by(effect for effect in axes[axis].effects if effect.mixes_axes)
     astray = matrix[axis, axis] < _OWN and np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6)
     return matrix.T if astray else None
 

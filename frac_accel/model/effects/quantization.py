@@ -52,16 +52,15 @@ class Quantization(Effect):
         values, output, used = seen.as_recorded()
         before = (values - output)[used]
         after = (values - self.simulate(output, None))[used]
-        share = min(self.step**2 / 12 / np.mean(before**2), _MOST)
-        if np.mean(after**2) > (1 - share) * np.mean(before**2):
-            after = _without(before, share)
-        one = seen.of_one_error
+        rounding, one = self.step**2 / 12, seen.of_one_error
+        errors = [(before, rounding)]
         if seen.record.band_hz is not None and one is not None:
             # what the values show beyond the band that is compared drowns no rounding within it
-            inside = (seen.measured - seen.output)[seen.used]
-            share = min(self.step**2 / 12 * np.sum(one**2) / np.mean(inside**2), _MOST)
+            errors.append(((seen.measured - seen.output)[seen.used], rounding * np.sum(one**2)))
+        for error, power in errors:
+            share = min(power / np.mean(error**2), _MOST)
             if np.mean(after**2) > (1 - share) * np.mean(before**2):
-                before, after = inside, _without(inside, share)
+                before, after = error, _without(error, share)
         return Reading({"step": 1e-6 * self.step}, before, after,
                        next(words for words in seen.found.words if "multiples" in words),
                        evident=moved)
