@@ -19,6 +19,7 @@ from .engine import OF_MOTION
 from .evidence import Evidence
 from .finding import Diagnosis
 from .gain import gain
+from .late_reference import is_reference_late
 from .naming import (
     constants_of,
     moved,
@@ -520,7 +521,7 @@ def _of_reference(engine, effects, named):
         if fault is None or cause in named or effects.get(fault.cause, fault) != fault:
             continue
         is_named = fault.cause in named
-        if is_named or engine.problem.record.is_reference_late:
+        if is_named or is_reference_late(engine.problem, effects):
             effects = {other: e for other, e in effects.items() if other != cause} \
                 | {fault.cause: fault}
             words += "" if is_named else "; what the sensor shows too early stands in the model " \
@@ -542,8 +543,8 @@ def _ahead(problem, effects, named):
     no stamp shows that to be late."""
     delays = {cause: effect.slow_delay_s() for cause, effect in effects.items()
               if not effect.of_reference}
-    if problem.record.is_reference_late or not any(
-            delay < 0 and cause not in named for cause, delay in delays.items()):
+    if not any(delay < 0 and cause not in named for cause, delay in delays.items()) \
+            or is_reference_late(problem, effects):
         return ""
     core = problem.axis_model(effects).effective_core
     own = own_delay_s(core) if isinstance(core, Oscillator) else 0.0
