@@ -41,7 +41,7 @@ from .flat import (
 from .judgement import judge
 from .leftover import related
 from .off_clock import are_lost, clock_of, put_back, slips_of
-from .other_axes import OtherAxes, may_be_unlike
+from .other_axes import OtherAxes, beside_same_laws, may_be_unlike
 from .read_off import drowned
 from .screened import screened
 from .search import is_nonlinear
@@ -224,6 +224,7 @@ def _beside_all_else(begin, engine, seed, record, engine_of):
     if engine_of is not None:
         begin, engine, best, seed = _with_own_resonance(begin, engine, best, seed, engine_of)
     begin, engine, best = _with_unlike_axes(begin, engine, best, seed)
+    begin, engine, best = _with_same_laws(begin, engine, best)
     begin, engine, best = _with_a_course(begin, engine, best, seed)
     if engine.part is None:
         engine, best = _without_start(begin, engine, best)
@@ -501,6 +502,20 @@ def _with_unlike_axes(begin, engine, best, seed):
     if own_best.cost - best.cost > (engine.part or engine).threshold(best):
         return begin, engine, best
     return own_begin, other, own_best
+
+
+def _with_same_laws(begin, engine, best):
+    """Engine for which the other axes have the laws that were found on this one, what begins it,
+    and its best set, where that says more; those given elsewhere."""
+    if engine.problem.limit.ends_search("whether the other axes have the same laws was not tried"):
+        return begin, engine, best
+    effects = beside_same_laws(engine, best)
+    if effects is None:
+        return begin, engine, best
+    begin = functools.partial(begin, others=dataclasses.replace(engine.problem.others,
+                                                                same_laws=True))
+    other = _beside(begin, engine, np.zeros(len(engine.wanted), bool))
+    return begin, other, other.run(effects)
 
 
 def _with_a_course(begin, engine, best, seed):

@@ -37,6 +37,8 @@ _HELD = 1e-4
 _KEEPS = (0.0, 0.5, 0.75, 0.9, 0.95)
 # Instants of a course at whose mean level that began; one alone would make a course by chance.
 _BEFORE = 4
+# Shares of a record in which a level fades that a gain or a zero follows at each sample.
+_FADES = (0.003, 0.01, 0.03, 0.1)
 # Share of a level's mean below which its logarithm is not followed.
 _LEVEL_FLOOR = 1e-3
 # Share of what is left that may still change with time, in the part of the budget that is its own.
@@ -122,6 +124,7 @@ def course_of(engine, best):
         effect = _through(p, cls, before, target, waves, p.used)
         values, weight = _values(effect), _mean(cls.column(before)**2, p.used)
         if _as_level(values, weight, before, p.used, waves) < _ALIKE \
+                and _left_by_level(cls.column(before), target, before, p.used) > power \
                 and not (_adds(cls) and _as_motion(values, weight, before, p.used)):
             found.append((left, cause, effect))
     return {cause: effect for _, cause, effect in sorted(found, key=lambda each: each[:2])[:1]}
@@ -268,17 +271,46 @@ def _as_level(course, weight, motion, used, waves=None):
             return values
         columns, root = _columns(np.linspace(0, 1, KNOTS), range(waves + 1)), np.sqrt(weight)
         return columns @ np.linalg.lstsq(columns * root[:, None], values * root, rcond=None)[0]
-    swing = motion - motion[used].mean()
     found = 0.0
-    for size in (abs(swing), abs(np.gradient(swing))):
-        for level in (_mean(size, used), _mean(size**2, used)):
-            before = level[:_BEFORE].mean()
-            for keeps in _KEEPS:
-                after = lfilter([1 - keeps], [1, -keeps], level, zi=[keeps * before])[0]
-                if np.std(after) > _VARIES * np.mean(after):
-                    found = max(found, *(_alike(course, weight, shown(each)) for each in (
-                        after, np.sqrt(after), np.log(after + _LEVEL_FLOOR * after.mean()))))
+    for size in _sizes(motion, used):
+        level = _mean(size, used)
+        for keeps in _KEEPS:
+            after = _fading(level, keeps, _BEFORE)
+            if np.std(after) > _VARIES * np.mean(after):
+                found = max(found, *(_alike(course, weight, shown(each)) for each in _laws(after)))
     return found
+
+
+def _left_by_level(column, target, motion, used):
+    """Power of a target that a column leaves whose share follows the motion's level at each sample
+    (`_as_level`): an automatic gain is faster than a course can be."""
+    least = np.inf
+    for size in _sizes(motion, used):
+        for share in _FADES:
+            fades = max(share * len(size), 1.0)
+            for level in _laws(_fading(size, np.exp(-1 / fades), int(fades))):
+                columns = (column[:, None] * np.c_[np.ones(len(level)), level])[used]
+                basis, _ = np.linalg.qr(columns)
+                least = min(least, float(target[used] @ target[used]
+                                         - np.sum((basis.T @ target[used])**2)))
+    return least
+
+
+def _sizes(motion, used):
+    """Size and power of a motion, and of its slope, at each sample."""
+    swing = motion - motion[used].mean()
+    return [size**power for size in (abs(swing), abs(np.gradient(swing))) for power in (1, 2)]
+
+
+def _fading(level, keeps, before):
+    """A level of which a share stays from one value to the next; it began as the mean of the first.
+    """
+    return lfilter([1 - keeps], [1, -keeps], level, zi=[keeps * level[:before].mean()])[0]
+
+
+def _laws(level):
+    """What a level may bring: itself, its root, its logarithm."""
+    return level, np.sqrt(level), np.log(level + _LEVEL_FLOOR * level.mean())
 
 
 def _mean(values, used):

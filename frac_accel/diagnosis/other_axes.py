@@ -32,15 +32,21 @@ class OtherAxes:
         Causes that say what a core is that nobody has stated: it is that of all axes.
     alike : bool
         Whether all axes have the same mount, dynamics and filters, as those of one housing do.
+    same_laws : bool
+        Whether they have the same laws, too: forces, play, and gains that change.
     """
 
     in_own_core: tuple = ()
     alike: bool = False
+    same_laws: bool = False
 
     def have(self, effect):
         """Whether the other axes have an effect too."""
         return effect.common_to_axes or effect.of_reference or effect.cause in self.in_own_core \
-            or (self.alike and is_of_all_if_alike(effect))
+            or self._share(effect)
+
+    def _share(self, effect):
+        return (self.alike and is_of_all_if_alike(effect)) or (self.same_laws and is_law(effect))
 
     def common(self, effects):
         """Of these effects, by cause, what the other axes have too."""
@@ -50,11 +56,12 @@ class OtherAxes:
         """The same as far as the record shows it: by what comes across with these effects (by
         cause), or of a turned sensor by the other axes' own samples."""
         alike = self.alike and (_crosses(effects) or _others_follow(problem, effects))
-        return dataclasses.replace(self, alike=alike)
+        return dataclasses.replace(self, alike=alike,
+                                   same_laws=self.same_laws and _crosses(effects))
 
     def said(self, finding):
         """A finding with words where it is written for all axes."""
-        if not (self.alike and is_of_all_if_alike(finding.effect)):
+        if not self._share(finding.effect):
             return finding
         return dataclasses.replace(finding, evidence=[
             *finding.evidence,
@@ -95,6 +102,12 @@ def is_of_all_if_alike(effect):
     return acts_before(effect) and not effect.of_reference
 
 
+def is_law(effect):
+    """Whether an effect bends the motion or changes with it or with time before axes are mixed."""
+    return effect.stage < CROSS_AXIS and not (effect.of_reference or effect.mixes_axes
+                                              or effect.restates_core or is_link(effect))
+
+
 def acts_before(effect):
     """Whether an effect changes dynamics before axes are mixed."""
     return effect.stage < CROSS_AXIS and (
@@ -116,6 +129,42 @@ def may_be_unlike(engine, best):
         return False
     unlike = fitted.problem.beside(dataclasses.replace(p.others, alike=False))
     return unlike.fit(best.effects).cost - best.cost < fitted.threshold(best)
+
+
+def beside_same_laws(engine, best):
+    """Effects of a set whose other axes have the laws that were found on this one, where that
+    describes clearly better what comes across, or as well what needs a turn, and a gain that takes
+    back what the turn does to it, to be said otherwise; or None."""
+    p, fitted = engine.problem, (engine.part or engine)
+    effects = best.effects
+    if p.others.same_laws or not any(is_law(effect) and cause not in engine.search.base
+                                     for cause, effect in effects.items()):
+        return None
+    threshold = fitted.threshold(best)
+    if not _crosses(effects):
+        effects, threshold = _across_for_a_turn(p, effects, engine.search.base), -threshold
+    if effects is None:
+        return None
+    same = fitted.problem.beside(dataclasses.replace(p.others, same_laws=True)).fit(effects)
+    return same.effects if best.cost - same.cost > threshold else None
+
+
+def _across_for_a_turn(problem, effects, base):
+    """Effects with shares of the other axes for a turn and a constant gain, or None."""
+    turns = {cause: effect for cause, effect in effects.items()
+             if cause not in base and effect.mixes_axes}
+    gains = {cause for cause, effect in effects.items()
+             if cause not in base and is_link(effect) and effect.is_constant}
+    if not turns or not gains:
+        return None
+    own = AXES[problem.axis]
+    cls, = (cls for cls in known_effects().values() if cls.describes == "across")
+    shares = np.prod([effect.share_of_axes(problem.axis) for effect in turns.values()], axis=0)
+    names = cls.fitted_parameters(own, problem.excited)
+    across = cls(**{name: float(shares[AXES.index(name)] / shares[problem.axis])
+                    for name in names})
+    return {**{cause: effect for cause, effect in effects.items()
+               if cause not in turns.keys() | gains}, cls.cause: across}
 
 
 def as_they_show(engine, fitted):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rig.hidden import draw_case
 from sampled_pair import sampled_pair
-from scipy.signal import butter, sosfilt, sosfiltfilt
+from scipy.signal import butter, lfilter, sosfilt, sosfiltfilt
 from searched import searched
 
 from frac_accel import SensorModel, diagnose, validate
@@ -124,6 +124,27 @@ def test_a_gain_that_falls_with_the_level_does_not_drift(seed):
                           0.005)
     found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
     assert "gain_drift" not in {finding.cause for finding in found.findings}
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_an_automatic_gain_does_not_drift(seed):
+    """It follows the envelope within seconds, faster than a course of few waves can."""
+    rng = np.random.default_rng([64, seed])
+    fine, seconds = FINER * RATE, 40.0
+    count = round(fine * seconds)
+    motion = sosfiltfilt(butter(2, [0.5, 25.0], "band", fs=fine, output="sos"),
+                         rng.normal(size=count))
+    drive = np.interp(np.arange(count) / fine, np.linspace(0, seconds, 9),
+                      rng.uniform(0.4, 1.2, 9))
+    motion *= drive / (motion * drive).std()
+    fades = fine * rng.uniform(1.0, 5.0)
+    keeps = np.exp(-1 / fades)
+    before = np.mean(motion[:round(fades)]**2)
+    envelope, _ = lfilter([1 - keeps], [1, -keeps], motion**2, zi=[keeps * before])
+    gain = envelope**-rng.uniform(0.1, 0.4)
+    record = sampled_pair(rng, (motion, motion * gain / gain.mean()), FINER, RATE, 0.003)
+    found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
+    assert found.findings == []
 
 
 @pytest.mark.parametrize("fastest", [1.2e-3, 1.2e-4])

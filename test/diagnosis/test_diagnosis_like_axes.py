@@ -3,10 +3,11 @@ them. Made at a far higher rate, without the package."""
 
 import numpy as np
 import pytest
+from rig.hidden import draw_case
 from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
-from frac_accel import Samples, SensorModel, diagnose, simulate
+from frac_accel import Samples, SensorModel, diagnose, simulate, validate
 from frac_accel.model.core import Gain
 
 RATE, FINE, COUNT = 200.0, 16, 12_000
@@ -151,3 +152,34 @@ def test_one_axis_with_shares_of_others_is_not_turned(seed):
     assert [finding.cause for finding in found.findings] == ["cross_axis_sensitivity"]
     across = found.findings[0].effect
     assert (across.y, across.z) == pytest.approx(shares, rel=0.01)
+
+
+@pytest.mark.parametrize("law", ["stiffness_drift", "gain_drift"])
+def test_a_law_of_all_axes_comes_across(law):
+    """Before, the other axes came across without it: the first was a turn and a gain that took back
+    what a turn does to it, the second left 1.5 times the noise."""
+    case = draw_case(4201, (law, "cross_axis_sensitivity"))
+    reference, sensor, _ = case.samples()
+    found = diagnose((reference, sensor), case.model())
+    assert {finding.cause for finding in found.findings} == {law, "cross_axis_sensitivity"}
+    across = next(f.effect for f in found.findings if f.cause == "cross_axis_sensitivity")
+    true = case.truth["cross_axis_sensitivity"]
+    assert (across.y, across.z) == pytest.approx((true["y"], true["z"]), abs=3e-4)
+    assert found.extended["rmse"] < 1.05 * case.noise_std
+    assert all(law in {e.cause for e in found.model.axis(axis).effects} for axis in "xyz")
+    assert validate((reference, sensor), found.model).whole_nrmse == pytest.approx(
+        found.extended["nrmse"], rel=0.2)
+
+
+def test_a_law_of_one_axis_is_not_given_to_the_others():
+    rng = np.random.default_rng(77)
+    motion = moving(rng)
+    rate, shares = rng.uniform(2e-3, 4e-3), rng.uniform(0.05, 0.1, 2)
+    seen = motion.copy()
+    seen[:, 0] *= 1 + rate * np.arange(len(motion)) / (FINE * RATE)
+    seen[:, 0] += motion[:, 1:] @ shares
+    found = diagnose(logged(rng, motion, seen), SensorModel(Gain(1.0)))
+    assert {finding.cause for finding in found.findings} == {"gain_drift",
+                                                             "cross_axis_sensitivity"}
+    assert found.extended["rmse"] < 1.05 * NOISE
+    assert [found.model.axis(axis).effects for axis in "yz"] == [(), ()]

@@ -8,6 +8,7 @@ import pytest
 from rig.hidden import INSEPARABLE, draw_case
 from rig.sensor import CAUSES, SECOND_SET
 
+from frac_accel.diagnosis.other_axes import OtherAxes
 from frac_accel.diagnosis.problem import Problem
 from frac_accel.model.effects import known_effects
 from frac_accel.record import Record
@@ -16,9 +17,10 @@ from frac_accel.simulation import EDGE
 # They add noise of their own, or their phase is not among the truth.
 _NOISY = {"reference_noise", "sampling_jitter", "polled_readout", "interference_bursts",
           "timestamp_jitter", "dropped_samples", "clipping", "quantization", "tone_interference"}
-# A stiff stop needs finer steps, an average of the reference has lost what lies at its zeros, and a
-# diagnosis of one axis does not give the others its causes unless they show them.
-_INEXACT = {"impact_stop", "reference_smoothing", "cross_axis_sensitivity"}
+# A stiff stop needs finer steps, and an average of the reference has lost what lies at its zeros.
+_INEXACT = {"impact_stop", "reference_smoothing"}
+# The rig's sensors are the same on all axes.
+_ALIKE = OtherAxes(alike=True, same_laws=True)
 _BENT = {"quadratic_stiffness", "cubic_stiffness", "hysteresis", "coulomb_friction",
          "stiffness_drift", "quadratic_damping", "backlash", "gain_drift", "gain_step",
          "temperature_sensitivity"}
@@ -35,9 +37,10 @@ def pairs():
     found = [pair for pair in itertools.combinations(causes, 2)
              if not any(set(pair) == other for other in map(set, INSEPARABLE))
              and not (_BEHIND in pair and set(pair) & _BENT)]
-    # a spring or a gain that changes behind a high-pass of the reference, or a turn, comes first
-    first = [pair for before in ("reference_ac_coupling", "misalignment") for pair in found
-             if before in pair and set(pair) & _BENT]
+    # a spring or a gain that changes behind a high-pass of the reference, or a turn, and what the
+    # other axes say with the same ones come first
+    first = [pair for before in ("reference_ac_coupling", "misalignment", "cross_axis_sensitivity")
+             for pair in found if before in pair and set(pair) & _BENT]
     order = np.random.default_rng(2026).permutation(len(found))
     return first + [found[i] for i in order if found[i] not in first]
 
@@ -55,7 +58,7 @@ def test_true_parameters_leave_noise(part):
         record = Record.of(reference, sensor, "x", celsius)
         used = record.valid.copy()
         used[:EDGE] = used[-EDGE:] = False
-        problem = Problem(record, 0, case.model(), used)
+        problem = Problem(record, 0, case.model(), used, others=_ALIKE)
         effects = {cause: known_effects()[cause](**parameters)
                    for cause, parameters in case.truth.items()}
         left[pair] = problem.cost(effects) / problem.count / case.noise_std**2
