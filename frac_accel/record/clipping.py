@@ -17,6 +17,8 @@ from ..shown import several
 # a pile, and one that is certain where values repeat. The crests of a quantised sine come to 2.4
 # times the next level.
 _FEWEST = 5
+# As many where no other value comes twice.
+_FEWEST_OF_ALL = 3
 _PILE_UP = 1.5
 _CERTAIN = 4
 _NEXT_VALUES = 2
@@ -73,7 +75,8 @@ def pile_up(values):
     """`Pile` at the greatest value if suspiciously many samples have it, else None."""
     top = values.max()
     count = int(np.count_nonzero(values == top))
-    if count < _FEWEST or count >= _RESTING * len(values):
+    if count < _FEWEST_OF_ALL or count >= _RESTING * len(values) \
+            or (count < _FEWEST and len(np.unique(values)) + count <= len(values)):
         return None
     # few samples say what the next values are, as a rule
     below, next_count, level = values[values < top], 0, top
@@ -92,7 +95,7 @@ def _is_held(values, top):
     as often."""
     starts = np.flatnonzero(np.r_[True, np.diff(values) != 0])
     lengths, there = np.diff(np.r_[starts, len(values)]), values[starts] == top
-    return bool(there.sum() < _FEWEST
+    return bool(there.sum() < _FEWEST and lengths[there].max() > 1
                 and np.sum(lengths[~there] >= lengths[there].max()) >= there.sum())
 
 

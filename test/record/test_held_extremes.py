@@ -33,3 +33,16 @@ def test_a_limit_of_held_values_is_one(seed, step):
     values = held(rng, step)
     limit = float(np.quantile(values, 0.9))
     assert certain(pile_up(np.minimum(values, limit)), step) == limit
+
+
+@pytest.mark.parametrize("runs", [[3], [4], [1, 1, 1], [2, 1]])
+def test_few_equal_extremes_are_a_limit_where_no_other_value_comes_twice(runs):
+    rng = np.random.default_rng([143, *runs])
+    values = rng.normal(size=8000)
+    at = 1000 * np.arange(1, 1 + len(runs))
+    clipped = np.concatenate([place + np.arange(run) for place, run in zip(at, runs)])
+    values[clipped] = 5.0
+    assert certain(pile_up(values), None) == 5.0
+    values[[17, 4711]] = values[42]  # here values do come twice
+    assert pile_up(values) is None
+    assert pile_up(np.r_[rng.normal(size=8000), 5.0, 5.0]) is None
