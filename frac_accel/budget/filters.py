@@ -282,7 +282,7 @@ class Filters:
     def _outer(self, rows):
         """Products over single samples."""
         total = np.zeros((self.size, self.size))
-        for some in np.array_split(rows, len(rows) // 4096 + 1):
+        for some in np.array_split(rows, len(rows) // 4096 + 1) if len(rows) else ():
             matrix = np.concatenate([_shifts(inputs, span, some).reshape(len(some), -1)
                                      for span, inputs, _ in self._inputs], axis=1)
             total += matrix.T @ matrix
@@ -292,9 +292,7 @@ class Filters:
         """Products over single samples: of all, and of those that each fold does not learn from."""
         by_fold, total = np.zeros((FOLDS, self.size, self.size)), 0.0
         for block, (start, stop) in enumerate(self._runs):
-            here = rows[(rows >= start) & (rows < stop)]
-            if len(here):
-                by_fold[block % FOLDS] += self._outer(here)
+            by_fold[block % FOLDS] += self._outer(rows[(rows >= start) & (rows < stop)])
         if self._learnt is self._runs:
             return by_fold.sum(axis=0), by_fold
         for start, stop in self._learnt:

@@ -101,6 +101,9 @@ _PEAKED, _AT_PEAK = 0.1, 10.0
 _DENSER = 10.0
 # Times the end of what is compared up to which an average's corner is looked for, and frequencies.
 _FAR_BEYOND, _CORNERS = 8.0, 2049
+# Times as low as the model in use has it that a core's resonance is another one's, which nothing
+# shows.
+_FAR_MOVED = 2.0
 # Share of a core's pole within which a link's zero undoes it.
 _UNDOES = 0.1
 # Share of the lead of a mount's zero by which the lag of what undoes it may differ, and share of
@@ -183,7 +186,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **_beside_a_strong_force(engine, best, takes, left, noise),
                          **_within_steps(engine, best, takes, added),
                          **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
-                         **_of_other_axes(engine, best),
+                         **_of_motion(engine, best),
                          **_at_the_edge(engine, best), **_hardly_rings(engine, best),
                          **_out_of_sight(engine, best), **_undoes_the_core(engine, best),
                          **_may_be_the_sensor(engine, best),
@@ -694,6 +697,7 @@ def _beyond_the_motion(engine, best):
         elif len(core) and min(lowest, np.min(core)) > _OUT_OF_SIGHT * seen:
             found[cause] = f"it and the core resonate above the motion, which shows up to " \
                            f"{seen / 2 / np.pi:.3g} Hz: there many filters do the same"
+    found |= _another_core(engine, best)
     unseen = [cause for cause, effect in best.effects.items() if cause not in engine.search.base
               and _lowest_pole(engine, best, effect) > _OUT_OF_SIGHT * seen]
     if len(unseen) > 1:
@@ -701,6 +705,19 @@ def _beyond_the_motion(engine, best):
                          f"{seen / 2 / np.pi:.3g} Hz: there many filters do the same"
                   for cause in unseen if cause not in found}
     return found
+
+
+def _another_core(engine, best):
+    """Causes that move the stated core far, to where it resonates beyond all that is compared."""
+    p, edge = engine.problem, _end_of_band_hz(engine.problem)
+    stated, core = p.baseline.axis(p.axis).core, p.axis_model(best.effects).effective_core
+    if _core_is_identified(engine) or not isinstance(core, Oscillator) \
+            or not edge < core.natural_frequency_hz < stated.natural_frequency_hz / _FAR_MOVED:
+        return {}
+    return {cause: f"it would resonate at {core.natural_frequency_hz:.3g} Hz, beyond all that is "
+                   f"compared ({edge:.3g} Hz) and far from the model's "
+                   f"{stated.natural_frequency_hz:.3g} Hz: many filters do the same"
+            for cause, effect in best.effects.items() if effect.restates_core}
 
 
 def _lowest_pole(engine, best, effect):
@@ -811,18 +828,22 @@ def _corner_hz(effect, edge_hz):
     return float(frequency[np.argmax(size)]) if size.any() else np.inf
 
 
-def _of_other_axes(engine, best):
-    """Causes that have nothing to do with the motion along their axis, but may have with another
-    one's."""
+def _of_motion(engine, best):
+    """Causes that should have nothing to do with the motion, but may have."""
     apart = {cause: effect for cause, effect in best.effects.items()
              if type(effect).may_be_of is not Effect.may_be_of}
-    p = engine.problem
-    others = [p.response(i) for i in range(3) if apart and i != p.axis
-              and np.ptp(p.record.reference[:, i])]
-    others = [np.where(p.used, motion - motion[p.used].mean(), 0.0) for motion in others]
-    return {cause: "another axis moves like that: what crosses over from there looks the same"
-            for cause, effect in apart.items()
-            if any(effect.may_be_of(motion, p.time) for motion in others)}
+    p, found = engine.problem, {}
+    for axis in np.roll(range(3), 2 - p.axis) if apart else ():
+        if not np.ptp(p.record.reference[:, axis]):
+            continue
+        motion = p.response(axis)
+        motion = np.where(p.used, motion - motion[p.used].mean(), 0.0)
+        words = "another axis moves like that: what crosses over from there looks the same" \
+            if axis != p.axis else "the reference moves like that, and more: a narrow filter " \
+            "makes the same of it"
+        found |= {cause: words for cause, effect in apart.items()
+                  if effect.may_be_of(motion, p.time)}
+    return found
 
 
 def _hardly_rings(engine, best):

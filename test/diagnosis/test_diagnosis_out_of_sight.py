@@ -1,8 +1,11 @@
 """What lies beyond all that is compared, or hides in a fit, must not lend its doings to a name."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import rig
+from exact_sines import samples
 from rig.excitation import band_noise
 from rig.oscillator import integrate
 from rig.record import simulate_record
@@ -13,10 +16,12 @@ from shaken import OVERSAMPLING, measured, shocks
 
 import frac_accel
 from frac_accel import SensorModel
-from frac_accel.diagnosis.doubts import _corner_hz
+from frac_accel.diagnosis.doubts import _another_core, _corner_hz
+from frac_accel.diagnosis.problem import Problem
 from frac_accel.io.samples import Samples
-from frac_accel.model.core import Gain
+from frac_accel.model.core import Gain, Oscillator
 from frac_accel.model.effects import known_effects
+from frac_accel.record import Record
 
 
 def random_motion(rng, rate, n, low_hz, high_hz):
@@ -113,6 +118,20 @@ def test_what_an_identified_sensor_shows_too_early_is_the_references_doing(seed,
     assert finding.cause == "reference_delay"
     assert abs(finding.effect.delay_s - late) < 4 * finding.std["delay_s"] < 2e-3
     assert found.model.reference_faults == (finding.effect,)
+
+
+@pytest.mark.parametrize("stated_hz, found_hz, doubted", [
+    (20e3, 67.0, True), (20e3, 50.0, False), (90.0, 67.0, False)])
+def test_a_core_that_moves_far_to_beyond_what_is_compared_has_no_name(stated_hz, found_hz, doubted):
+    """A delay of half a sample was a natural frequency of 67 Hz for the 20 kHz of the model, beside
+    a named resonance; up to 64 Hz were compared."""
+    cause = "core_parameter_shift"
+    found = known_effects()[cause](natural_frequency_hz=found_hz, damping_ratio=0.8)
+    stated = SensorModel(Oscillator(stated_hz, 0.7, 1.0, 1.0))
+    pair = np.zeros((2, 4000)) + np.random.default_rng(1).normal(size=4000)
+    problem = Problem(Record.of(*samples(*pair, rate=128.0), "x"), 0, stated, np.ones(4000, bool))
+    engine = SimpleNamespace(problem=problem, loose={})
+    assert (cause in _another_core(engine, SimpleNamespace(effects={cause: found}))) is doubted
 
 
 @pytest.mark.long  # a minute of processor time each

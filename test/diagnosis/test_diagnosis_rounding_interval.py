@@ -53,3 +53,12 @@ def test_what_only_the_sensor_shows_drowns_no_rounding(seed):
     low, high = found.findings[0].gain.ci95
     worth = 1 - noise / np.hypot(noise, step / np.sqrt(12))
     assert low - (high - low) / 2 < worth < high + (high - low) / 2
+
+
+def test_a_lattice_that_the_reference_has_too_has_no_name():
+    """Two logs of one gyroscope, a step apart: the model's own rounding, 2e-9, was rounded off."""
+    rng = np.random.default_rng(9)
+    motion, step = record(rng, lambda s: 1 + 0 * s, band=(0.5, 8.0), n=4000, rate=50.0)[0], 1e-2
+    reference = step * np.round(motion / step)
+    found = diagnose((reference, reference + step), SensorModel(Gain(1.0)), sampling_rate_hz=50.0)
+    assert [finding.cause for finding in found.findings] == ["offset"]

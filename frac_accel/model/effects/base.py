@@ -378,8 +378,8 @@ class Effect:
         return 0.0
 
     def may_be_of(self, motion, time_s):
-        """Whether what this effect adds may be another axis' motion, shape (n,), that crosses over,
-        though it has nothing to do with the axis' own."""
+        """Whether what this effect adds may be of a motion, shape (n,), with which it should have
+        nothing to do: of another axis, that crosses over, or of its own behind a filter."""
         return False
 
     def std_by_stamps(self, record):

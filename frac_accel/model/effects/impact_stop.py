@@ -10,7 +10,7 @@ from .base import CORE, Effect, require_oscillator
 from .fit_starts import positive
 
 # Where a stop is looked for: shares of the largest output that was measured on its side.
-_SHARES = (0.6, 0.75, 0.9)
+_SHARES = (0.25, 0.4, 0.6, 0.75, 0.9)
 _STIFFNESS = 20.0
 # Largest simulated values that tell whether there is a stop, at least, and how much smaller the
 # measured ones must be on average, in RMS of the residual.
@@ -68,7 +68,8 @@ class ImpactStop(Effect):
                    if len(measured) and _held_back(side * simulated, side * residual)]
         if len(reached) == 2:
             reached = [(1.0, 2.0), *reached]
-        return [positive(cls(float(share * way * np.max(way * measured)), _STIFFNESS, sides))
+        return [positive(cls(float(share * way * np.max(way * measured)), _STIFFNESS, sides),
+                         "stiffness")
                 for way, sides in reached for share in _SHARES if np.max(way * measured) > 0]
 
 

@@ -10,6 +10,9 @@ from .base import QUANTIZATION, Effect, Reading
 # Share of an error's power that rounding must have where the values have been put on other
 # instants, and largest share that is ascribed to it.
 _LEAST, _MOST = 0.2, 0.99
+# Share of a rounding error (RMS) that a model must err by, at least: one that errs by less has the
+# same lattice.
+_SEEN = 0.1
 # Stretches of a record from each of which rounding takes the same power.
 _STRETCHES = 40
 
@@ -51,6 +54,8 @@ class Quantization(Effect):
             return None
         values, output, used = seen.as_recorded()
         before = (values - output)[used]
+        if np.mean(before**2) < _SEEN**2 * self.step**2 / 12:
+            return None
         after = (values - self.simulate(output, None))[used]
         rounding, one = self.step**2 / 12, seen.of_one_error
         errors = [(before, rounding)]
