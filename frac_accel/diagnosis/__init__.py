@@ -507,8 +507,6 @@ def _with_unlike_axes(begin, engine, best, seed):
 def _with_same_laws(begin, engine, best):
     """Engine for which the other axes have the laws that were found on this one, what begins it,
     and its best set, where that says more; those given elsewhere."""
-    if engine.problem.limit.ends_search("whether the other axes have the same laws was not tried"):
-        return begin, engine, best
     effects = beside_same_laws(engine, best)
     if effects is None:
         return begin, engine, best

@@ -833,6 +833,7 @@ def _of_motion(engine, best):
     apart = {cause: effect for cause, effect in best.effects.items()
              if type(effect).may_be_of is not Effect.may_be_of}
     p, found = engine.problem, {}
+    # its own axis last: that says more than the others
     for axis in np.roll(range(3), 2 - p.axis) if apart else ():
         if not np.ptp(p.record.reference[:, axis]):
             continue

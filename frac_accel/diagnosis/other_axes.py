@@ -136,17 +136,22 @@ def beside_same_laws(engine, best):
     describes clearly better what comes across, or as well what needs a turn, and a gain that takes
     back what the turn does to it, to be said otherwise; or None."""
     p, fitted = engine.problem, (engine.part or engine)
-    effects = best.effects
-    if p.others.same_laws or not any(is_law(effect) and cause not in engine.search.base
+    effects, base = best.effects, engine.search.base
+    if p.others.same_laws or not any(is_law(effect) and cause not in base
                                      for cause, effect in effects.items()):
         return None
-    threshold = fitted.threshold(best)
+    least = fitted.threshold(best)
     if not _crosses(effects):
-        effects, threshold = _across_for_a_turn(p, effects, engine.search.base), -threshold
-    if effects is None:
+        effects, least = _across_for_a_turn(p, effects, base), -least
+    if effects is None or p.limit.ends_search(
+            "whether the other axes have the same laws was not tried"):
         return None
-    same = fitted.problem.beside(dataclasses.replace(p.others, same_laws=True)).fit(effects)
-    return same.effects if best.cost - same.cost > threshold else None
+    same = fitted.problem.beside(dataclasses.replace(p.others, same_laws=True))
+    try:
+        fit = same.fit(effects)
+    except FracAccelError:  # along another axis, the motion has no bound
+        return None
+    return fit.effects if best.cost - fit.cost > least else None
 
 
 def _across_for_a_turn(problem, effects, base):
@@ -155,14 +160,15 @@ def _across_for_a_turn(problem, effects, base):
              if cause not in base and effect.mixes_axes}
     gains = {cause for cause, effect in effects.items()
              if cause not in base and is_link(effect) and effect.is_constant}
-    if not turns or not gains:
+    if len(turns) != 1 or not gains:
         return None
-    own = AXES[problem.axis]
+    turn, = turns.values()
+    shares = turn.share_of_axes(problem.axis)
+    if np.argmax(np.abs(shares)) != problem.axis:
+        return None
     cls, = (cls for cls in known_effects().values() if cls.describes == "across")
-    shares = np.prod([effect.share_of_axes(problem.axis) for effect in turns.values()], axis=0)
-    names = cls.fitted_parameters(own, problem.excited)
-    across = cls(**{name: float(shares[AXES.index(name)] / shares[problem.axis])
-                    for name in names})
+    across = cls(**{name: float(shares[AXES.index(name)] / shares[problem.axis]) for name in
+                    cls.fitted_parameters(AXES[problem.axis], problem.excited)})
     return {**{cause: effect for cause, effect in effects.items()
                if cause not in turns.keys() | gains}, cls.cause: across}
 
