@@ -469,7 +469,7 @@ def _with_slips(begin, engine, own, shown, ready, identified_without):
             begin, engine, own = _on_its_clock(begin, engine, own, ready, identified_without)
         return begin, engine, own, shown
     begin = functools.partial(other_begin, base={**other_begin.keywords["base"], **slips})
-    return begin, _beside(begin, other, np.zeros(len(other.wanted), bool)), others, \
+    return begin, _beside(begin, other), others, \
         {**shown, **slips}
 
 
@@ -495,7 +495,7 @@ def _with_unlike_axes(begin, engine, best, seed):
             "whether the other axes have other filters was not tried"):
         return begin, engine, best
     own_begin = functools.partial(begin, others=dataclasses.replace(p.others, alike=False))
-    other = _beside(own_begin, engine, np.zeros(len(engine.wanted), bool))
+    other = _beside(own_begin, engine)
     # most of what was found holds there, too: what does not is left out again
     own_best = other.run({cause: effect for cause, effect in best.effects.items()
                           if cause in other.search.candidates} or seed)
@@ -512,7 +512,7 @@ def _with_same_laws(begin, engine, best):
         return begin, engine, best
     begin = functools.partial(begin, others=dataclasses.replace(engine.problem.others,
                                                                 same_laws=True))
-    other = _beside(begin, engine, np.zeros(len(engine.wanted), bool))
+    other = _beside(begin, engine)
     return begin, other, other.run(effects)
 
 
@@ -547,7 +547,7 @@ def _with_courses(begin, engine, courses):
     """Engine, otherwise as another one, whose every fit has these courses, and what begins it."""
     begin = functools.partial(begin, base={**begin.keywords["base"], **courses},
                               candidates=beside(courses, begin.keywords["candidates"]))
-    other = _beside(begin, engine, np.zeros(len(engine.wanted), bool))
+    other = _beside(begin, engine)
     other.search.courses = courses
     return begin, other
 
@@ -586,7 +586,7 @@ def _without_known(begin, engine, best, seed):
         record, *rest = begin.args
         begin = functools.partial(begin.func, engine.record.without(p.axis, known), *rest,
                                   **begin.keywords)
-        other = _beside(begin, engine, np.zeros(len(engine.wanted), bool))
+        other = _beside(begin, engine)
         other.drowned, best = engine.drowned, other.run(seed)
         engine = other
     if engine is not first[0] and not by_sample(engine, engine.on_whole(best)).any():
@@ -608,8 +608,8 @@ def _without_start(begin, engine, best):
                              if cause not in engine.search.base})
 
 
-def _beside(begin, engine, hidden):
-    """The same engine without some samples that count."""
+def _beside(begin, engine, hidden=np.False_):
+    """The same engine, without some samples that count where asked."""
     other = begin(used=engine.wanted & ~hidden)
     other.at_limit, other.identified, other.found = engine.at_limit, engine.identified, engine.found
     other.spikes, other.aside = engine.spikes, engine.aside

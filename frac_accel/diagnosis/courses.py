@@ -124,8 +124,8 @@ def course_of(engine, best):
         effect = _through(p, cls, before, target, waves, p.used)
         values, weight = _values(effect), _mean(cls.column(before)**2, p.used)
         if _as_level(values, weight, before, p.used, waves) < _ALIKE \
-                and _left_by_level(cls.column(before), target, before, p.used) > power \
-                and not (_adds(cls) and _as_motion(values, weight, before, p.used)):
+                and not (_adds(cls) and _as_motion(values, weight, before, p.used)) \
+                and _left_by_level(cls.column(before), target, before, p.used) > power:
             found.append((left, cause, effect))
     return {cause: effect for _, cause, effect in sorted(found, key=lambda each: each[:2])[:1]}
 
@@ -284,16 +284,14 @@ def _as_level(course, weight, motion, used, waves=None):
 def _left_by_level(column, target, motion, used):
     """Power of a target that a column leaves whose share follows the motion's level at each sample
     (`_as_level`): an automatic gain is faster than a course can be."""
-    least = np.inf
+    taken, target, column = 0.0, target[used], column[used]
     for size in _sizes(motion, used):
         for share in _FADES:
             fades = max(share * len(size), 1.0)
             for level in _laws(_fading(size, np.exp(-1 / fades), int(fades))):
-                columns = (column[:, None] * np.c_[np.ones(len(level)), level])[used]
-                basis, _ = np.linalg.qr(columns)
-                least = min(least, float(target[used] @ target[used]
-                                         - np.sum((basis.T @ target[used])**2)))
-    return least
+                basis, _ = np.linalg.qr(np.c_[column, column * level[used]])
+                taken = max(taken, float(np.sum((basis.T @ target)**2)))
+    return float(target @ target) - taken
 
 
 def _sizes(motion, used):

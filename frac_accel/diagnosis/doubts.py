@@ -684,13 +684,13 @@ def _beyond_the_motion(engine, best):
     seen = 2 * np.pi * min(_highest_hz(engine, best, _ALL_MOTION), _highest_seen_hz(engine, best))
     core = np.abs(p.axis_model(best.effects).effective_core.poles()) \
         if _core_is_identified(engine) else []
-    late = is_reference_late(p, best.effects)
     for cause, effect in _filters(engine, best).items():
         if not is_link(effect) or effect.of_reference or not len(effect.poles()):
             continue
         lowest = np.abs(effect.poles()).min()
-        if late and lowest > highest \
-                and abs(effect.transfer_function(np.array([1j * highest]))[0]) > 1:
+        if lowest > highest \
+                and abs(effect.transfer_function(np.array([1j * highest]))[0]) > 1 \
+                and is_reference_late(p, best.effects):
             found[cause] = "it resonates above the motion, which ends at " \
                            f"{highest / 2 / np.pi:.3g} Hz: to a reference that is late and was " \
                            "smoothed, fast motion looks as much too large"

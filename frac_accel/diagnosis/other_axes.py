@@ -166,11 +166,17 @@ def _across_for_a_turn(problem, effects, base):
     shares = turn.share_of_axes(problem.axis)
     if np.argmax(np.abs(shares)) != problem.axis:
         return None
-    cls, = (cls for cls in known_effects().values() if cls.describes == "across")
-    across = cls(**{name: float(shares[AXES.index(name)] / shares[problem.axis]) for name in
-                    cls.fitted_parameters(AXES[problem.axis], problem.excited)})
+    cls, others = _bringing_across(problem)
+    across = cls(**{name: float(shares[AXES.index(name)] / shares[problem.axis])
+                    for name in others})
     return {**{cause: effect for cause, effect in effects.items()
                if cause not in turns.keys() | gains}, cls.cause: across}
+
+
+def _bringing_across(problem):
+    """Class of the effect that adds shares of the other axes, and the axes that it can add."""
+    cls, = (cls for cls in known_effects().values() if cls.describes == "across")
+    return cls, cls.fitted_parameters(AXES[problem.axis], problem.excited)
 
 
 def as_they_show(engine, fitted):
@@ -242,8 +248,7 @@ def fit_shares(problem, effects, output, rest):
         If no other axis moves, or something comes across from them already.
     """
     p = problem
-    cls, = (cls for cls in known_effects().values() if cls.describes == "across")
-    others = cls.fitted_parameters(AXES[p.axis], p.excited)
+    cls, others = _bringing_across(p)
     if not others or any(effect.mixes_axes for effect in effects.values()):
         raise FracAccelError("nothing more can come across")
     learning = p.restricted(p.used & ~rest)

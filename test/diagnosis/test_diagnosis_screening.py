@@ -11,7 +11,6 @@ from frac_accel import Samples, SensorModel, diagnose
 from frac_accel.diagnosis.problem import Problem
 from frac_accel.model.effects import known_effects
 from frac_accel.record import Record
-from frac_accel.simulation import EDGE
 
 
 @pytest.mark.parametrize("seed, other", [
@@ -23,13 +22,11 @@ def test_dry_friction_beside_another_force_is_simulated(seed, other):
                         for cause in (other, "coulomb_friction"))
     reference, sensor, celsius = case.samples()
     record = Record.of(reference, sensor, "x", celsius)
-    used = record.valid.copy()
-    used[:EDGE] = used[-EDGE:] = False
-    problem = Problem(record, 0, case.model(), used)
+    problem = Problem(record, 0, case.model(), record.valid)
     without = problem.measured - problem.simulate({other: beside})
     changed = problem.joined({other: beside}, "coulomb_friction", friction)
-    left = np.sqrt(np.mean((without - changed)[used]**2))
-    assert left < 1.1 * case.noise_std < 0.5 * np.sqrt(np.mean(without[used]**2))
+    left = np.sqrt(np.mean((without - changed)[problem.used]**2))
+    assert left < 1.1 * case.noise_std < 0.5 * np.sqrt(np.mean(without[problem.used]**2))
 
 
 @pytest.mark.parametrize("seed", [3, 4])

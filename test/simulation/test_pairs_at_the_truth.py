@@ -12,7 +12,6 @@ from frac_accel.diagnosis.other_axes import OtherAxes
 from frac_accel.diagnosis.problem import Problem
 from frac_accel.model.effects import known_effects
 from frac_accel.record import Record
-from frac_accel.simulation import EDGE
 
 # They add noise of their own, or their phase is not among the truth.
 _NOISY = {"reference_noise", "sampling_jitter", "polled_readout", "interference_bursts",
@@ -56,9 +55,7 @@ def test_true_parameters_leave_noise(part):
             continue  # no draw has effects of the wanted size
         reference, sensor, celsius = case.samples()
         record = Record.of(reference, sensor, "x", celsius)
-        used = record.valid.copy()
-        used[:EDGE] = used[-EDGE:] = False
-        problem = Problem(record, 0, case.model(), used, others=_ALIKE)
+        problem = Problem(record, 0, case.model(), record.valid, others=_ALIKE)
         effects = {cause: known_effects()[cause](**parameters)
                    for cause, parameters in case.truth.items()}
         left[pair] = problem.cost(effects) / problem.count / case.noise_std**2

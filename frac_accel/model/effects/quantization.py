@@ -54,10 +54,10 @@ class Quantization(Effect):
             return None
         values, output, used = seen.as_recorded()
         before = (values - output)[used]
-        if np.mean(before**2) < _SEEN**2 * self.step**2 / 12:
+        rounding, one = self.step**2 / 12, seen.of_one_error
+        if np.mean(before**2) < _SEEN**2 * rounding:
             return None
         after = (values - self.simulate(output, None))[used]
-        rounding, one = self.step**2 / 12, seen.of_one_error
         errors = [(before, rounding)]
         if seen.record.band_hz is not None and one is not None:
             # what the values show beyond the band that is compared drowns no rounding within it
