@@ -27,8 +27,9 @@ _LEAST, _MOST = 1e-4, 0.1
 _FLOOR, _SCATTERS = 0.05, 1.3
 # A floor: coherence with the sensor below which nothing is shared, share of the frequencies that
 # must have none, ratio of the densities there, and times what motion of that density would show in
-# the sensor (power) that it may have: such motion would make the coherence at least 1/3.
-_SHARED, _WIDE, _EVEN, _LOUDEST = 0.2, 0.15, 2.0, 2.0
+# the sensor (power) that it may have: such motion would make the coherence at least 1/3. Where it
+# has more, the share of the coherence that such motion would make up to which it makes none.
+_SHARED, _WIDE, _EVEN, _LOUDEST, _ABSENT = 0.2, 0.15, 2.0, 2.0, 0.1
 # An excess: lines of the spectrum, and coherence from which one counts; standard deviations by
 # which it must stand out, squares of such deviations that it may leave a line, those that any
 # filter must leave more, and rounds in which the deviations become known.
@@ -167,8 +168,9 @@ def _estimates(record, column, used, covariance_std, own_rate, most, size, spect
     inner = _inner(spectrum[0], record)
     spectra = [values[inner] for values in (*spectrum, other, shared)]
     median = welch(one, rate, nperseg=size, average="median")[1][inner]
-    for density, by in ((_floor(*spectra[1:], median), "floor"),
-                        (_excess(*spectra, len(one) / size, transfer_function), "excess")):
+    segments = len(one) / size
+    for density, by in ((_floor(*spectra[1:], median, segments), "floor"),
+                        (_excess(*spectra, segments, transfer_function), "excess")):
         if density is not None and not _is_shared(density, *spectra[1:]):
             yield density, by
 
@@ -199,7 +201,7 @@ def _at_rest(one, two, used, rate):
     return float(np.sqrt(np.mean(parts[0][quiet]**2))) if shared < _SHARED**2 else None
 
 
-def _floor(own, other, shared, median):
+def _floor(own, other, shared, median, segments):
     """An even density of the reference at frequencies where the sensor has none of it, or None.
 
     Parameters
@@ -207,6 +209,8 @@ def _floor(own, other, shared, median):
     own, other, shared, median : ndarray, shape (n,)
         Densities of the reference, the sensor and both (absolute), and the median of the
         reference's over the segments.
+    segments : float
+        Of the record, side by side.
     """
     # one that most segments do not have is that of a few spikes
     if np.quantile(median, _FLOOR) < _STEADY * np.quantile(own, _FLOOR):
@@ -218,7 +222,10 @@ def _floor(own, other, shared, median):
     low, high = np.quantile(own[apart], (0.1, 0.9))
     density = np.median(own[apart])
     gain = np.median(shared[together] / own[together])
-    if high > _EVEN * low or np.median(other[apart]) > _LOUDEST * gain**2 * density:
+    # the coherence that motion of that density would make, and what chance makes of none at least
+    expected, chance = gain**2 * density / np.median(other[apart]), 1 / (2 * segments)
+    if high > _EVEN * low or (expected * _LOUDEST < 1
+                              and coherence[apart].mean() - chance > _ABSENT * expected):
         return None
     return float(density)
 

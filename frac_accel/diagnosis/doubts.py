@@ -1,5 +1,6 @@
 """Why a fitted cause is not named: the rules that look at the record beside the fit."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -9,6 +10,7 @@ from ..errors import FracAccelError
 from ..model import AXES, AxisModel, SensorModel, is_link
 from ..model.core import Gain, Oscillator
 from ..model.effects.base import GAIN, OFFSET, Effect
+from ..model.parameters import parameter_fields
 from .courses import with_level
 from .engine import LONG, WEIGHS
 from .gradual import gradual
@@ -75,6 +77,9 @@ _ACAUSAL = 3.0
 # Share of the motion's power beyond whose frequencies none is seen, and times the highest of these
 # from which a resonance is out of sight.
 _ALL_MOTION, _OUT_OF_SIGHT = 0.9999, 1.2
+# Of a further resonance, times the frequency at which it raises the end of what is compared as
+# much as a filter of the reference.
+_FURTHER = (0.95, 1.0, 1.05)
 # Sampling intervals below which a lead is none of stamps.
 _NO_LEAD = 0.01
 # Times what several filters leave (RMS) up to which one other filter is as likely.
@@ -131,7 +136,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
     doubts = dict.fromkeys(engine.uncontested, "the time limit left no time for its rivals")
     doubts |= {**engine.as_the_sensor, **left_open(engine, best, stds, gains)}
     takes = {cause: g.taken for cause, g in gains.items()}
-    own, rest = engine.by_reference(best), engine.rms(best.residual)
+    own, rest = engine.by_reference(best), engine.rms_beside_rounding(best)
     added = {cause: engine.added(best, cause) for cause in gains}
     for cause in gains:
         rms = min(takes[cause], engine.rms(added[cause]))
@@ -186,7 +191,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **_beside_a_strong_force(engine, best, takes, left, noise),
                          **_within_steps(engine, best, takes, added),
                          **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
-                         **_of_motion(engine, best),
+                         **_of_motion(engine, best), **_of_a_further_mode(engine, best),
                          **_at_the_edge(engine, best), **_hardly_rings(engine, best),
                          **_out_of_sight(engine, best), **_undoes_the_core(engine, best),
                          **_may_be_the_sensor(engine, best),
@@ -754,6 +759,42 @@ def _at_the_edge(engine, best):
     return found
 
 
+def _of_a_further_mode(engine, best):
+    """Filters of the reference that raise the response beside one of the sensor that rings, where a
+    further resonance like that, beyond all that is compared, does the same."""
+    p, found = engine.problem, {}
+    edge = _end_of_band_hz(p)
+    ringing = [effect for effect in _filters(engine, best).values() if is_link(effect)
+               and np.size(effect.zeros()) < np.size(effect.poles())
+               and 0 < _damping(effect) < _CLEAR_PEAK]
+    for cause, effect in _filters(engine, best).items() if ringing else ():
+        if not (is_link(effect) and effect.of_reference) or p.limit.ends_judging(
+                "no further resonance was tried in the place of the reference's filter"):
+            continue
+        raised = abs(effect.transfer_function(2j * np.pi * edge))
+        # where it would raise the response as much at the end of what is compared
+        beyond_hz = edge / np.sqrt(1 - 1 / raised) if raised > 1 else np.inf
+        rest = {name: other for name, other in best.effects.items() if name != cause}
+        if not np.isfinite(beyond_hz):
+            continue
+        costs = [p.fit({**rest, "further": _at_frequency(ringing[0], share * beyond_hz)}).cost
+                 for share in _FURTHER]
+        # the least of a parabola through them, as far as they have one between them
+        bend, slope = (costs[2] - 2 * costs[1] + costs[0]) / 2, (costs[2] - costs[0]) / 2
+        least = costs[1] - slope**2 / (4 * bend) if abs(slope) < 2 * bend else min(costs)
+        if least - best.cost < engine.threshold(best):
+            found[cause] = (f"a further resonance near {beyond_hz:.3g} Hz, beyond what is "
+                            "compared, does the same")
+    return found
+
+
+def _at_frequency(link, frequency_hz):
+    """A ringing link with its resonance elsewhere."""
+    return dataclasses.replace(link, **{
+        field.name: float(frequency_hz) for field in parameter_fields(type(link))
+        if field.metadata["unit"] == "Hz"})
+
+
 def _undoes_the_core(engine, best):
     """Links with a zero where the core that was identified has a pole: of both together a filter
     with fewer poles does the same."""
@@ -940,8 +981,7 @@ def _elsewhen(engine, best, takes, left):
     courses = [cause for cause in takes if best.effects[cause].shows_with_time
                and not best.effects[cause].everyday]
     # what coarse rounding leaves is of no course
-    rounding = (engine.coarse_step(best) or 0.0)**2 / 12
-    rest = math.sqrt(max(engine.rms(best.residual)**2 - rounding, 0.0))
+    rest = engine.rms_beside_rounding(best)
     # a sweep's frequency and level change with time, too: several follow any course of the motion,
     # as several offsets do of the mean
     for kind in (False, True):
@@ -1041,14 +1081,23 @@ def _acausal(engine, best, stds):
     # and a clear peak is no smooth filter's
     own = [cause for cause in own if cause not in ahead
            and not 0 < _damping(best.effects[cause]) < _CLEAR_PEAK]
-    strange = [cause for cause in own if not best.effects[cause].everyday
-               and not lead < min(best.effects[cause].pure_delay_s(), 1 / p.rate)]
+    digital = not _leads_less(engine, best, lead)
+    strange = [cause for cause in own if not best.effects[cause].everyday and not (
+        digital and lead < min(best.effects[cause].pure_delay_s(), 1 / p.rate))]
     # a high-pass has nothing that a lead would take back, where another filter has
     strange = [cause for cause in strange if not leads(best.effects[cause])] or strange
-    if ahead and strange and not is_reference_late(p, best.effects):
+    if lead >= _NO_LEAD / p.rate and strange and not is_reference_late(p, best.effects):
         return dict.fromkeys([*ahead, *strange], f"a lead of {lead:.3g} s, which only a fit beside "
                              "a filter shows: together they imitate something else")
     return {cause: f"a lead of {lead:.3g} s beside a filter, less than a sampling interval: a "
                    "digital filter has one of its own"
             for cause, lead in late.items() if own and lead < 1 / p.rate} | {
         cause: _LEAST.format(lead) for cause, lead in late.items() if lead < _NO_LEAD / p.rate}
+
+
+def _leads_less(engine, best, lead):
+    """Whether as many causes with a filter describe the record as well beside a smaller lead."""
+    return any(fit.problem is best.problem and not fit.rough and fit.cost <= best.cost
+               and len(fit.causes) <= len(best.causes) and _filters(engine, fit)
+               and 0 < max(-effect.pure_delay_s() for effect in fit.effects.values()) < lead
+               for fit in engine.search.fits.values() if fit is not best)

@@ -20,7 +20,7 @@ from ..model import is_link
 from ..model.effects import effect_of
 from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
-from .names import on_bound, special_case
+from .names import DETERMINED, on_bound, special_case
 from .noise_colour import lead, noise_peak
 from .other_axes import UNLIKE
 from .problem import Problem, acts_on_spring
@@ -83,6 +83,8 @@ _COARSE = 0.2
 # RMS of the error of the model in use where it is judged, over that before, below which it errs
 # before.
 _ERRS_THERE = 0.5
+# The same of the error before, over that where it is judged, below which nothing is learnt before.
+_ERRS_BEFORE = 0.25
 # Parts of a record by whose means an error is slow, and the share of it (RMS) that counts.
 _SLOW_PARTS, _ERRS_SLOWLY = 100, 0.2
 # Error of a simulation, and of values put on other instants, over the output's spread.
@@ -136,7 +138,8 @@ class Engine:
         """Samples that count and are not learnt from, but judged on, as a mask.
 
         Where the model in use errs before them, as beside a zero that has settled, every other
-        stretch: nothing could be judged by them.
+        stretch: nothing could be judged by them. The same where it errs in them only, as behind a
+        step: nothing could be learnt before.
         """
         p = self.problem
         reference = p.record.reference[:, p.axis]
@@ -144,10 +147,15 @@ class Engine:
         error = self.search.baseline.residual
         length = max(len(error) // _SLOW_PARTS, 1)
         slow = uniform_filter1d(error, length)
-        slowly = np.std(slow[p.used & ~last]) > _ERRS_SLOWLY * np.std(error[p.used & ~last])
-        errs = all(np.std(values[p.used & last]) > _ERRS_THERE * np.std(values[p.used & ~last])
-                   for values in (error, *([slow] if slowly else [])))
-        return p.used & (last if errs else alternating_stretches(reference, STRETCHES))
+        before, there = ([float(np.std(values[p.used & rows])) for values in (error, slow)]
+                         for rows in (~last, last))
+
+        def errs(most, least, share):
+            slowly = most[1] > _ERRS_SLOWLY * most[0]
+            return least[0] > share * most[0] and (not slowly or least[1] > share * most[1])
+        if errs(before, there, _ERRS_THERE) and errs(there, before, _ERRS_BEFORE):
+            return p.used & last
+        return p.used & alternating_stretches(reference, STRETCHES)
 
     def threshold(self, fitted):
         """Cost by which a further parameter must improve on a fit."""
@@ -422,6 +430,13 @@ class Engine:
                 continue
         return None
 
+    def is_of_stamps(self, fitted, cause):
+        """Whether what a cause says is no more than what scattered stamps leave open: it is there,
+        and nothing else may take its place, but has no name."""
+        effect, stds = fitted.effects[cause], self.uncertainties(fitted)[cause]
+        return any(abs(getattr(effect, name)) < DETERMINED * std and std > stds[name] / 2
+                   for name, std in effect.std_by_stamps(self.record).items())
+
     def uncertainties(self, fitted):
         """Standard uncertainties by cause and parameter, for any spectrum of the residual, and
         however it goes with the motion."""
@@ -623,9 +638,14 @@ class Engine:
     def is_accounted(self, fitted, noise):
         """Whether what a fit leaves beside coarse rounding is little, or no more than
         `EstablishedNoise`."""
-        p, rounding = self.problem, (self.coarse_step(fitted) or 0.0)**2 / 12
-        left = np.sqrt(max(fitted.cost / p.count - rounding, 0.0))
-        return is_accounted(left, float(np.std(p.measured[p.used])), noise)
+        p = self.problem
+        return is_accounted(self.rms_beside_rounding(fitted), float(np.std(p.measured[p.used])),
+                            noise)
+
+    def rms_beside_rounding(self, fitted):
+        """RMS [output units] of what a fit leaves beside coarse rounding."""
+        rounding = (self.coarse_step(fitted) or 0.0)**2 / 12
+        return float(np.sqrt(max(fitted.cost / self.problem.count - rounding, 0.0)))
 
     def learnt(self, fitted):
         """The same causes, fitted to the learning part of the record only, beside all that the

@@ -123,7 +123,8 @@ def _settled(engine, best, noise_std, known=None):
     for _ in range(_AGAIN):
         # what cannot be named must not stand in the way of what can
         unwanted = {cause for cause in there.doubts.keys() - constants_of(there.best.effects)
-                    if cause not in engine.uncontested}
+                    if cause not in engine.uncontested
+                    and not engine.is_of_stamps(there.best, cause)}
         # what is common may be in doubt only for its odd company
         unwanted = {cause for cause in unwanted
                     if not there.best.effects[cause].everyday} or unwanted

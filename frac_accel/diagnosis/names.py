@@ -3,7 +3,7 @@
 import numpy as np
 
 # Standard uncertainties that at least one parameter must be from the value that changes nothing.
-_DETERMINED = 3.0
+DETERMINED = 3.0
 # Relative standard uncertainty above which a parameter that is above zero is open.
 _OPEN = 0.5
 # Share of the record above which the uncertainty of an instant leaves it open.
@@ -46,7 +46,7 @@ def undetermined(effect, unknowns, theta, stds, core, duration_s):
             return f"{unknown.name} is open: {value:.3g} s ± {std:.1g} s"
         null = null_value(effect, unknown.name, core)
         if null is not None and np.isfinite(null):
-            moved.append(abs(value - null) > _DETERMINED * std)
+            moved.append(abs(value - null) > DETERMINED * std)
     special = special_case(effect, stds, core)
     if special:
         return special

@@ -779,8 +779,9 @@ class Problem:
             if limits["reach"]:
                 least, most = self.scales.reach(field, scale)
                 low, high = max(low, least), min(high, most)
-            span = 1e-3 if np.isfinite(low) and np.isfinite(high) else 0
-            low, high = low / scale + span, high / scale - span
+            low, high = low / scale, high / scale
+            span = 1e-3 * min(1.0, high - low) if np.isfinite(high - low) else 0.0
+            low, high = low + span, high - span
         return Unknown(effect.cause, field.name, logarithmic, scale, low, high,
                        limits["step"] or _STEP, limits["jumps"])
 

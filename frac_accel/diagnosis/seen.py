@@ -7,7 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import freqz, periodogram
 
-from ..model.effects import known_effects
+from ..model.effects import Effect, known_effects
 from ..record.resampling import filled, inner_filter, inner_taps
 from ..signals.convolution import refined
 from .gain import gain
@@ -45,6 +45,9 @@ class Seen:
     parts : callable
         Gives the error budget of what is left: shares by part, where they are above zero for
         certain.
+    unguessed : callable
+        Gives the output, shape (n,), of the reference as it was recorded, where the fit has it
+        behind a filter that guesses the motion from a noisy one; else None.
     """
 
     record: object
@@ -57,6 +60,7 @@ class Seen:
     spikes: np.ndarray
     is_coarse: bool
     parts: object
+    unguessed: object
 
     @property
     def is_uneven(self):
@@ -270,10 +274,20 @@ def readings(engine, fitted, found, shown, wanted=lambda cls: True):
                 rows & p.used[here], rows & p.taken(engine.spikes)[here],
                 engine.coarse_step(fitted) is not None, lambda: {
                     entry["part"]: entry["share"] for entry in engine.budget(fitted).parts
-                    if entry["ci95"][0] > 0})
+                    if entry["ci95"][0] > 0},
+                lambda: _unguessed(p, fitted, here))
     for cause, cls in known_effects().items():
         if not (cls.read_off or cause in shown) or not wanted(cls):
             continue
         recognised = cls.recognised(seen, shown.get(cause))
         if recognised is not None:
             yield cause, *recognised
+
+
+def _unguessed(problem, fitted, here):
+    """`Seen.unguessed` of a fit, in some rows."""
+    plain = {cause: effect for cause, effect in fitted.effects.items()
+             if type(effect).unknown_density is Effect.unknown_density}
+    if len(plain) == len(fitted.effects):
+        return None
+    return (fitted.output + problem.simulate(plain) - problem.simulate(fitted.effects))[here]

@@ -20,11 +20,44 @@ def names(case):
     (7_460_000, "offset"),               # under gravity a dead zone does the same
     (7_660_000, "clipping"),             # of so few values that they need a model to be certain
     (7_660_000, "timestamp_jitter"),     # of stamps whose values were put on other instants
+    (9_160_000, "ac_coupling"),          # beside a lead of a thousandth of an interval
+    (9_160_000, "mounting_resonance"),   # a motion guessed from a noisy reference leaves bursts
 ])
 def test_named_on_the_road(seed, cause):
     case = draw_road_case(seed, [cause])
     found, _ = names(case)
     assert case.causes <= found <= case.causes | set(case.besides)
+
+
+@pytest.mark.thorough
+def test_noise_of_the_reference_shows_beside_a_louder_sensor():
+    """The reference's low-pass is turned back, its noise with it: a filter would take that."""
+    case = draw_road_case(9_160_000, ["reference_low_pass"])
+    found, result = names(case)
+    assert case.causes <= found <= case.causes | set(case.besides) | {"reference_noise"}
+    (std,) = (x.effect.std for x in result.findings if x.cause == "reference_noise")
+    assert std == pytest.approx(case.sensor.effects["reference_noise"]["std"], rel=0.05)
+
+
+@pytest.mark.thorough
+def test_what_comes_across_stands_beside_coarse_rounding():
+    case = draw_case(9_120_019, ["ac_coupling", "cross_axis_sensitivity", "quantization"])
+    found, _ = names(case)
+    assert found == case.causes
+
+
+def test_what_scattered_stamps_leave_open_is_no_other_cause():
+    """A skew that the stamps do not rule out had no name, and a stiffness that drifts took its
+    place."""
+    case = draw_road_case(9_160_001, ["timestamp_jitter"])
+    found, _ = names(case)
+    assert case.causes <= found <= case.causes | set(case.besides)
+
+
+def test_noise_of_the_reference_that_shows_nowhere_is_no_filter_without_a_delay():
+    case = draw_road_case(9_160_000, ["low_pass_lag"])
+    found, _ = names(case)
+    assert not found - case.causes - set(case.besides)
 
 
 def test_a_zero_that_follows_the_vibration_is_no_burst_of_noise():

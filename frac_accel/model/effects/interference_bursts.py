@@ -39,6 +39,9 @@ _SETTLES = 0.9
 _SHOWN, _SHOWN_RESAMPLED = 0.01, 0.5
 # Share of the bursts' power in samples that repeat the one before: a sensor that is stuck.
 _REPEATED = 0.5
+# Share of the bursts' power below which the noisy reference itself leaves of it: what guesses the
+# motion from that reference does so for the mean motion, and too small where there is more of it.
+_GUESSED = 0.5
 # Share of what two noises gain that a noise which grows with the motion may gain.
 _AS_GOOD = 0.5
 # Samples around a missing one in which a filter still answers to what was put in its place.
@@ -91,6 +94,10 @@ class InterferenceBursts(Effect):
         values, simulated, _ = seen.as_recorded()
         recorded = values - simulated
         if _repeated(values, recorded) > _REPEATED:
+            return None
+        plain = seen.unguessed()
+        if plain is not None and np.mean((seen.measured - plain)[used][inside]**2) \
+                < _GUESSED * np.mean(error[inside]**2):
             return None
         length = inside.sum() / len(starts)
         after = np.where(inside, error * np.sqrt(noise / loud), error)
