@@ -169,7 +169,8 @@ def _estimates(record, column, used, covariance_std, own_rate, most, size, spect
     spectra = [values[inner] for values in (*spectrum, other, shared)]
     median = welch(one, rate, nperseg=size, average="median")[1][inner]
     segments = len(one) / size
-    for density, by in ((_floor(*spectra[1:], median, segments), "floor"),
+    bends = 2 * _LEAST * np.var(one) / rate
+    for density, by in ((_floor(*spectra[1:], median, segments, bends), "floor"),
                         (_excess(*spectra, segments, transfer_function), "excess")):
         if density is not None and not _is_shared(density, *spectra[1:]):
             yield density, by
@@ -201,7 +202,7 @@ def _at_rest(one, two, used, rate):
     return float(np.sqrt(np.mean(parts[0][quiet]**2))) if shared < _SHARED**2 else None
 
 
-def _floor(own, other, shared, median, segments):
+def _floor(own, other, shared, median, segments, bends):
     """An even density of the reference at frequencies where the sensor has none of it, or None.
 
     Parameters
@@ -211,6 +212,8 @@ def _floor(own, other, shared, median, segments):
         reference's over the segments.
     segments : float
         Of the record, side by side.
+    bends : float
+        Density from which it bends a fit: below it one that the sensor drowns is none that matters.
     """
     # one that most segments do not have is that of a few spikes
     if np.quantile(median, _FLOOR) < _STEADY * np.quantile(own, _FLOOR):
@@ -224,8 +227,9 @@ def _floor(own, other, shared, median, segments):
     gain = np.median(shared[together] / own[together])
     # the coherence that motion of that density would make, and what chance makes of none at least
     expected, chance = gain**2 * density / np.median(other[apart]), 1 / (2 * segments)
-    if high > _EVEN * low or (expected * _LOUDEST < 1
-                              and coherence[apart].mean() - chance > _ABSENT * expected):
+    drowned = expected * _LOUDEST < 1
+    if high > _EVEN * low or drowned and (
+            density < bends or coherence[apart].mean() - chance > _ABSENT * expected):
         return None
     return float(density)
 
