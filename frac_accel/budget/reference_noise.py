@@ -115,13 +115,12 @@ def reference_noise(record, column, used, covariance_std=None, transfer_function
     inner = _inner(frequency, record)
     power = float(np.var(one))
     most = np.quantile(own[inner], _FLOOR)
-    for density, by in _estimates(record, column, used, covariance_std, own_rate, most, size,
-                                  (frequency, own), transfer_function):
+    for density, by, matters in _estimates(record, column, used, covariance_std, own_rate, most,
+                                           size, (frequency, own), transfer_function):
         std = np.sqrt(density * own_rate / 2)
         bends = density * rate / 2 / power > _LEAST
-        # an excess that bends nothing may be some other small thing
         if density <= _SCATTERS**2 * most and density * rate / 2 / power < _MOST \
-                and (bends or by != "excess"):
+                and (bends or matters):
             share = np.clip(1 - density / own, 0.0, 1.0)
             # a constant is no noise, and the first line holds what the window leaves of it
             share[:2] = 1.0, share[2]
@@ -148,7 +147,8 @@ def _inner(frequency, record):
 
 def _estimates(record, column, used, covariance_std, own_rate, most, size, spectrum,
                transfer_function):
-    """Pairs of a density [(m/s²)²/Hz] and what shows it, the best first.
+    """Densities [(m/s²)²/Hz], what shows them and whether they matter though they bend no fit, the
+    best first.
 
     `own_rate` [Hz] is that at which the reference was sampled, `most` its lowest density,
     `spectrum` its frequencies and densities.
@@ -159,21 +159,23 @@ def _estimates(record, column, used, covariance_std, own_rate, most, size, spect
         for std, by in ((_periods(one, used, recognise(one, rate).period_samples), "periods"),
                         (_at_rest(one, two, used, rate), "rest")):
             if std is not None:
-                yield 2 * std**2 / rate, by
+                yield 2 * std**2 / rate, by, True
     if _given(covariance_std) and not _untrusted(covariance_std, None,
                                                  _SCATTERS * np.sqrt(most * own_rate / 2)):
-        yield 2 * covariance_std**2 / own_rate, "covariance"
+        yield 2 * covariance_std**2 / own_rate, "covariance", True
     other = welch(two, rate, nperseg=size)[1]
     shared = np.abs(csd(one, two, rate, nperseg=size)[1])
     inner = _inner(spectrum[0], record)
     spectra = [values[inner] for values in (*spectrum, other, shared)]
     median = welch(one, rate, nperseg=size, average="median")[1][inner]
     segments = len(one) / size
-    bends = 2 * _LEAST * np.var(one) / rate
-    for density, by in ((_floor(*spectra[1:], median, segments, bends), "floor"),
-                        (_excess(*spectra, segments, transfer_function), "excess")):
+    floor, is_heard = _floor(*spectra[1:], median, segments)
+    # an excess that bends nothing may be some other small thing
+    for density, by, matters in (
+            (floor, "floor", is_heard),
+            (_excess(*spectra, segments, transfer_function), "excess", False)):
         if density is not None and not _is_shared(density, *spectra[1:]):
-            yield density, by
+            yield density, by, matters
 
 
 def _is_shared(density, own, other, shared):
@@ -202,8 +204,9 @@ def _at_rest(one, two, used, rate):
     return float(np.sqrt(np.mean(parts[0][quiet]**2))) if shared < _SHARED**2 else None
 
 
-def _floor(own, other, shared, median, segments, bends):
-    """An even density of the reference at frequencies where the sensor has none of it, or None.
+def _floor(own, other, shared, median, segments):
+    """An even density of the reference at frequencies where the sensor has none of it, or None; and
+    whether the sensor is quiet enough there to show motion of that density.
 
     Parameters
     ----------
@@ -212,26 +215,24 @@ def _floor(own, other, shared, median, segments, bends):
         reference's over the segments.
     segments : float
         Of the record, side by side.
-    bends : float
-        Density from which it bends a fit: below it one that the sensor drowns is none that matters.
     """
     # one that most segments do not have is that of a few spikes
     if np.quantile(median, _FLOOR) < _STEADY * np.quantile(own, _FLOOR):
-        return None
+        return None, False
     coherence = shared**2 / np.maximum(own * other, 1e-300)
     apart, together = coherence < _SHARED, coherence > 0.9
     if apart.mean() < _WIDE or not together.any():
-        return None
+        return None, False
     low, high = np.quantile(own[apart], (0.1, 0.9))
     density = np.median(own[apart])
     gain = np.median(shared[together] / own[together])
     # the coherence that motion of that density would make, and what chance makes of none at least
     expected, chance = gain**2 * density / np.median(other[apart]), 1 / (2 * segments)
-    drowned = expected * _LOUDEST < 1
-    if high > _EVEN * low or drowned and (
-            density < bends or coherence[apart].mean() - chance > _ABSENT * expected):
-        return None
-    return float(density)
+    is_heard = bool(expected * _LOUDEST >= 1)
+    if high > _EVEN * low \
+            or not is_heard and coherence[apart].mean() - chance > _ABSENT * expected:
+        return None, False
+    return float(density), is_heard
 
 
 def _excess(frequency, own, other, shared, segments, transfer_function):

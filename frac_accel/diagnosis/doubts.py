@@ -762,23 +762,25 @@ def _at_the_edge(engine, best):
 def _of_a_further_mode(engine, best):
     """Filters of the reference that raise the response beside one of the sensor that rings, where a
     further resonance like that, beyond all that is compared, does the same."""
-    p, found = engine.problem, {}
+    p, found, filters = engine.problem, {}, _filters(engine, best)
     edge = _end_of_band_hz(p)
-    ringing = [effect for effect in _filters(engine, best).values() if is_link(effect)
+    ringing = [effect for effect in filters.values() if is_link(effect)
                and np.size(effect.zeros()) < np.size(effect.poles())
                and 0 < _damping(effect) < _CLEAR_PEAK]
-    for cause, effect in _filters(engine, best).items() if ringing else ():
-        if not (is_link(effect) and effect.of_reference) or p.limit.ends_judging(
+    for cause, effect in filters.items() if ringing else ():
+        raised = abs(effect.transfer_function(2j * np.pi * edge)) \
+            if is_link(effect) and effect.of_reference else 0.0
+        if raised <= 1 or p.limit.ends_judging(
                 "no further resonance was tried in the place of the reference's filter"):
             continue
-        raised = abs(effect.transfer_function(2j * np.pi * edge))
         # where it would raise the response as much at the end of what is compared
-        beyond_hz = edge / np.sqrt(1 - 1 / raised) if raised > 1 else np.inf
+        beyond_hz = edge / np.sqrt(1 - 1 / raised)
         rest = {name: other for name, other in best.effects.items() if name != cause}
-        if not np.isfinite(beyond_hz):
+        try:
+            costs = [p.fit({**rest, "further": _at_frequency(ringing[0], share * beyond_hz)}).cost
+                     for share in _FURTHER]
+        except FracAccelError:
             continue
-        costs = [p.fit({**rest, "further": _at_frequency(ringing[0], share * beyond_hz)}).cost
-                 for share in _FURTHER]
         # the least of a parabola through them, as far as they have one between them
         bend, slope = (costs[2] - 2 * costs[1] + costs[0]) / 2, (costs[2] - costs[0]) / 2
         least = costs[1] - slope**2 / (4 * bend) if abs(slope) < 2 * bend else min(costs)
@@ -1076,7 +1078,9 @@ def _acausal(engine, best, stds):
              if effect.pure_delay_s() < 0}
     late = {cause: lead for cause, lead in ahead.items()
             if cause in links and links[cause].of_reference}
-    lead = max(ahead.values(), default=0.0)
+    if not ahead:
+        return {}
+    lead = max(ahead.values())
     # a digital filter of some samples delays by less than the one of its length in continuous time
     # and a clear peak is no smooth filter's
     own = [cause for cause in own if cause not in ahead

@@ -20,7 +20,7 @@ from ..model import is_link
 from ..model.effects import effect_of
 from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
-from .names import DETERMINED, on_bound, special_case
+from .names import on_bound, special_case
 from .noise_colour import lead, noise_peak
 from .other_axes import UNLIKE
 from .problem import Problem, acts_on_spring
@@ -429,13 +429,6 @@ class Engine:
             except FracAccelError:
                 continue
         return None
-
-    def is_of_stamps(self, fitted, cause):
-        """Whether what a cause says is no more than what scattered stamps leave open: it is there,
-        and nothing else may take its place, but has no name."""
-        effect, stds = fitted.effects[cause], self.uncertainties(fitted)[cause]
-        return any(abs(getattr(effect, name)) < DETERMINED * std and std > stds[name] / 2
-                   for name, std in effect.std_by_stamps(self.record).items())
 
     def uncertainties(self, fitted):
         """Standard uncertainties by cause and parameter, for any spectrum of the residual, and

@@ -9,6 +9,7 @@ from .doubts import doubts_about
 from .engine import WEIGHS
 from .finding import Finding
 from .gain import certainty
+from .names import DETERMINED
 from .naming import confidence, constants_of, refitted, suspect
 from .other_axes import as_they_show
 from .read_off import read_off
@@ -124,7 +125,7 @@ def _settled(engine, best, noise_std, known=None):
         # what cannot be named must not stand in the way of what can
         unwanted = {cause for cause in there.doubts.keys() - constants_of(there.best.effects)
                     if cause not in engine.uncontested
-                    and not engine.is_of_stamps(there.best, cause)}
+                    and not _is_of_stamps(engine.record, there, cause)}
         # what is common may be in doubt only for its odd company
         unwanted = {cause for cause in unwanted
                     if not there.best.effects[cause].everyday} or unwanted
@@ -205,6 +206,14 @@ def _without_the_weakest(engine, here, noise_std, known):
                 > WEIGHS * engine.unexplained(here.best):
             return there, dropped
     return here, {}
+
+
+def _is_of_stamps(record, here, cause):
+    """Whether what a cause says is no more than what scattered stamps leave open: it is there, and
+    nothing else may take its place, but has no name."""
+    effect = here.best.effects[cause]
+    return any(abs(getattr(effect, name)) < DETERMINED * std and std > here.stds[cause][name] / 2
+               for name, std in effect.std_by_stamps(record).items())
 
 
 def _examined(engine, best, noise_std, known):

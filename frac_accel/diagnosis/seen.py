@@ -290,4 +290,4 @@ def _unguessed(problem, fitted, here):
              if type(effect).unknown_density is Effect.unknown_density}
     if len(plain) == len(fitted.effects):
         return None
-    return (fitted.output + problem.simulate(plain) - problem.simulate(fitted.effects))[here]
+    return (fitted.output + problem.simulate(plain) - fitted.simulated)[here]
