@@ -12,6 +12,7 @@ import struct
 import subprocess
 import sys
 import termios
+import threading
 import time
 
 import numpy as np
@@ -77,15 +78,16 @@ class Terminal:
                     self.text += os.read(self.ours, 65536).decode(errors="replace")
 
     def until(self, pattern, seconds=30.0):
-        """Match of a pattern in the newest picture; waits for it."""
+        """Match of a pattern in the newest picture that is whole; waits for it."""
         end_s = time.monotonic() + seconds
         while time.monotonic() < end_s:
             self.read(0.2)
-            picture = self.text.rpartition("\x1b[H")[2]
-            plain = re.sub(r"\x1b\[[?0-9;]*[A-Za-z]", "", picture)
-            if found := re.search(pattern, plain):
-                return found
-        raise AssertionError(f"no {pattern!r} in {plain}")
+            pictures = [re.sub(r"\x1b\[[?0-9;]*[A-Za-z]", "", picture)
+                        for picture in self.text.split("\x1b[H")[-2:]]
+            for plain in reversed(pictures):
+                if found := re.search(pattern, plain):
+                    return found
+        raise AssertionError(f"no {pattern!r} in {self.text[-60_000:]}")
 
     def end(self, key):
         """Press a key; exit status, and whether the terminal is as it was."""
@@ -99,7 +101,7 @@ class Terminal:
 
 
 def test_it_shows_what_the_corrector_says_and_quits_cleanly(tmp_path):
-    model, raw = write_model(tmp_path / "soft.yaml", 10.0), samples(3, seconds=20.0)
+    model, raw = write_model(tmp_path / "soft.yaml", 10.0), samples(3, seconds=90.0)
     messages = cdr.encode_samples(cdr.IMU, raw)
     with ros_domain() as environment, Probe(environment) as probe, NodeProcess(
             "corrector", environment, {}, *parameters_file(
@@ -110,7 +112,8 @@ def test_it_shows_what_the_corrector_says_and_quits_cleanly(tmp_path):
         said = probe.metrics("/corrector/metrics")
         # it may take long to start
         shown.until("/imu/data_raw")
-        with background(publish, [(publisher, messages)], RATE_HZ):
+        enough = threading.Event()
+        with background(publish, [(publisher, messages)], RATE_HZ, enough):
             # once two seconds of it are in the window
             probe.until(lambda: probe.statuses, "no status")
             shown.read(6.0)
@@ -130,6 +133,7 @@ def test_it_shows_what_the_corrector_says_and_quits_cleanly(tmp_path):
             assert row[6] in {status.message.split()[0] for status in probe.statuses}
             other.until("waiting for rear: the raw topics .* are /imu/data_raw")
             assert other.end(b"\x03") == (0, True)
+            enough.set()
         assert shown.end(b"q") == (0, True)
         assert "Traceback" not in shown.text + other.text
 
