@@ -5,10 +5,10 @@ import functools
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import freqz, periodogram
+from scipy.signal import periodogram
 
 from ..model.effects import Effect, known_effects
-from ..record.resampling import filled, inner_filter, inner_taps
+from ..record.resampling import filled, inner_filter, inner_taps, taken_away
 from ..signals.convolution import refined
 from .gain import gain
 from .leftover import rounding_errors
@@ -71,12 +71,18 @@ class Seen:
     @functools.cached_property
     def repeated(self):
         """Share of the sensor's samples that say what the one before says, of those between whose
-        neighbours the signal moves on, by more than its lattice."""
+        neighbours the signal moves on, by more than its lattice; without those that its lattice
+        makes the same, about as many as it lets be a step higher, or lower."""
         values = self.record.topics[1].values[:, self.axis] if self.record.topics \
             else self.measured
+        step = self.found.step or 0.0
         across = np.abs(values[2:] - values[:-2])
-        moves = across > max(_MOVES_ON * (self.found.step or 0.0), float(np.median(across)))
-        return float(np.mean((values[1:-1] == values[:-2])[moves])) if moves.any() else 0.0
+        moves = across > max(_MOVES_ON * step, float(np.median(across)))
+        if not moves.any():
+            return 0.0
+        change = np.abs(values[1:-1] - values[:-2])[moves]
+        beside = np.mean((change > step / 2) & (change < 1.5 * step)) / 2
+        return max(float(np.mean(change == 0) - beside), 0.0)
 
     @functools.cached_property
     def of_one_error(self):
@@ -105,13 +111,11 @@ class Seen:
         if record.band_hz is None:
             return 0.0
         values = filled(topic.clock.slot, topic.values)[0][:, self.axis]
-        turns, density = periodogram(values, topic.clock.rate_hz / record.sampling_rate_hz,
-                                     window="hann")
-        band = record.band_hz / record.sampling_rate_hz
-        moving = np.maximum(density - noise / band, 0.0)
-        taps = inner_taps(record.sampling_rate_hz, record.band_hz, len(self.output))
-        kept = np.where(turns < 0.5, np.abs(freqz(taps, worN=2 * np.pi * turns)[1])**2, 0.0)
-        return float(np.sum((2 * np.pi * turns)**2 * moving * (1 - kept)) * turns[1])
+        rate = record.sampling_rate_hz
+        turns, density = periodogram(values, topic.clock.rate_hz / rate, window="hann")
+        moving = np.maximum(density - noise / (record.band_hz / rate), 0.0)
+        away = taken_away(rate, record.band_hz, len(self.output), rate * turns)
+        return float(np.sum((2 * np.pi * turns)**2 * moving * away) * turns[1])
 
     def rounding(self):
         """Errors, shape (n,), that a coarse lattice leaves of noisy simulated values."""

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.fft import rfft
 
+from .resampling import inner_edge, taken_away
+
 # Lines to both sides over which the window spreads a tone, and the share of the power beyond that
 # one must have to be told.
 _SPREAD, _MOST = 2, 0.5
@@ -16,7 +18,7 @@ class Beyond(NamedTuple):
     Attributes
     ----------
     band_hz : float
-        That frequency.
+        That frequency, up to which half of the amplitude or more is compared.
     share : float
         RMS there over that of the whole, its mean taken off.
     tone_hz, tone_share : float or None
@@ -37,25 +39,28 @@ class Beyond(NamedTuple):
                 f"output (RMS) lies beyond{tone}")
 
 
-def beyond(values, rate_hz, band_hz):
+def beyond(values, rate_hz, band_hz, compared_hz):
     """`Beyond` of a signal on uniform instants.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-    rate_hz, band_hz : float
+    rate_hz, band_hz, compared_hz : float
+        Its rate, the band that is compared, and the rate at which it is.
     """
     power = np.abs(rfft((values - values.mean()) * np.hanning(len(values))))**2
-    line_hz = rate_hz / len(values)
-    first = int(np.ceil(band_hz / line_hz)) + _SPREAD
-    above, total = power[first:], power[_SPREAD:].sum()
-    if not len(above) or not total > 0:
-        return Beyond(band_hz, 0.0)
+    line_hz, edge_hz = rate_hz / len(values), inner_edge(band_hz)
+    total = power[_SPREAD:].sum()
+    # what the filter at the band's edge takes away
+    above = power * taken_away(compared_hz, band_hz, len(values), line_hz * np.arange(len(power)))
+    above[:_SPREAD] = 0.0
+    if not total > 0:
+        return Beyond(edge_hz, 0.0)
     share = float(np.sqrt(above.sum() / total))
     peak = int(np.argmax(above))
     near = slice(max(peak - _SPREAD, 0), peak + _SPREAD + 1)
     tone = float(above[near].sum() / max(above.sum(), 1e-300))
     if tone < _MOST:
-        return Beyond(band_hz, share)
+        return Beyond(edge_hz, share)
     centre = float(above[near] @ np.arange(len(above))[near] / above[near].sum())
-    return Beyond(band_hz, share, (first + centre) * line_hz, tone)
+    return Beyond(edge_hz, share, centre * line_hz, tone)

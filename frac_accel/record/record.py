@@ -189,7 +189,7 @@ class Record:
         if topic.clock.kind == "uneven" or topic.clock.rate_hz <= reference.clock.rate_hz:
             return None
         values, _ = filled(topic.clock.slot, topic.values)
-        return beyond(values[:, column], topic.clock.rate_hz, self.band_hz)
+        return beyond(values[:, column], topic.clock.rate_hz, self.band_hz, self.sampling_rate_hz)
 
     @functools.cached_property
     def rates_std_ppm(self):

@@ -19,9 +19,10 @@ _ATTENUATION_DB = 80.0
 _KAISER = 0.1102 * (_ATTENUATION_DB - 8.7)
 # Half-width of the filter [intervals of the rate that is asked for].
 REACH = int(np.ceil((_ATTENUATION_DB - 7.95) / (2.285 * 2 * np.pi * (_GONE - BAND)) / 2))
-# Share of a band that is kept where nothing beyond it may count, and half-width of the filter
-# [periods of the band's edge].
+# Share of a band that is kept where nothing beyond it may count, lines on which the filter's
+# response is known, and its half-width [periods of the band's edge].
 _INNER = 0.8
+_LINES = 8192
 _INNER_TAPS = (_ATTENUATION_DB - 7.95) / (2.285 * 2 * np.pi * (1 - _INNER)) / 2
 # Half-width of the filter by which what is missing of one signal is guessed from the other, samples
 # that are enough to fit it to, and share of the power that it may leave.
@@ -98,7 +99,20 @@ def inner_taps(rate_hz, band_hz, count):
     """The filter by which `within` leaves out what is beyond a band of so many samples."""
     from scipy.signal import firwin
     half = min(int(np.ceil(_INNER_TAPS * rate_hz / band_hz)), count - 1)
-    return firwin(2 * half + 1, (1 + _INNER) / 2 * band_hz, window=("kaiser", _KAISER), fs=rate_hz)
+    return firwin(2 * half + 1, inner_edge(band_hz), window=("kaiser", _KAISER), fs=rate_hz)
+
+
+def inner_edge(band_hz):
+    """Frequency [Hz] at which half of the amplitude is left."""
+    return (1 + _INNER) / 2 * band_hz
+
+
+def taken_away(rate_hz, band_hz, count, frequencies_hz):
+    """Share of the power at some frequencies, shape (m,), that it leaves out; all of what no signal
+    of that rate can have."""
+    from scipy.signal import freqz
+    lines_hz, response = freqz(inner_taps(rate_hz, band_hz, count), worN=_LINES, fs=rate_hz)
+    return 1 - np.interp(frequencies_hz, lines_hz, np.abs(response)**2, right=0.0)
 
 
 def inner_filter(rate_hz, band_hz, count, every=1):

@@ -25,6 +25,9 @@ _OPEN_BY = 0.5
 # Share of samples that repeat the one before while the signal moves on, from which they are what
 # scatters.
 _REPEATED = 0.01
+# Share of a filter's largest coefficient from which it lets through what stands in for a sample
+# beside, and of the samples that is left at least without those.
+_LETS_THROUGH, _KEPT = 0.05, 0.5
 # Correlation of one sample's shift with the next, above which the instants wander and do not
 # scatter.
 _INDEPENDENT = 0.2
@@ -57,7 +60,10 @@ class SamplingJitter(Effect):
             return None  # stamps that scatter do the same, and so do values between samples
         if seen.repeated > _REPEATED:
             return None
-        rate, used = seen.record.sampling_rate_hz, seen.used
+        rate = seen.record.sampling_rate_hz
+        used = seen.used & ~_bridged_beside(seen, around) if len(around) > 1 else seen.used
+        if used.sum() < _KEPT * seen.used.sum():
+            return None
         slope = slope_of(seen.output)
         error = _without_delay((seen.measured - seen.output)[used], slope[used])
         bend = slope_of(slope)
@@ -106,6 +112,16 @@ class SamplingJitter(Effect):
             {"rms_s": float(uncertain / rate)}, error, after,
             f"the error's power follows the square of the slope: {share:.0%} of it, "
             f"{factor / std:.3g} standard deviations from none")
+
+
+def _bridged_beside(seen, around):
+    """Samples, a mask, whose values hold what stands in for others that say nothing: the filter to
+    the band that is compared lets it through, and it is off where the motion is fast."""
+    from scipy.ndimage import binary_dilation
+    reach = int(np.flatnonzero(np.abs(around) > _LETS_THROUGH * np.abs(around).max())[-1]
+                - len(around) // 2)
+    silent = seen.rows & ~seen.used
+    return binary_dilation(silent, iterations=reach) if reach and silent.any() else silent
 
 
 def _without_delay(error, slope):
