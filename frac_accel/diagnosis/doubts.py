@@ -99,6 +99,9 @@ _CANCELLED, _ADDS = 0.02, 10.0
 _STRONG = 0.3
 # Share of the highest frequency that is compared from which a peak lies at its end.
 _EDGE = 0.95
+# Correlation of what is left with the motion times what a cause adds that should have nothing to do
+# with it, from which a gain that comes and goes may have made both.
+_WITH_MOTION = 0.3
 # Damping ratio below which a link has a peak, and times what is left within half an octave of it
 # (RMS) that it must then take.
 _PEAKED, _AT_PEAK = 0.1, 10.0
@@ -887,6 +890,14 @@ def _of_motion(engine, best):
             "makes the same of it"
         found |= {cause: words for cause, effect in apart.items()
                   if effect.may_be_of(motion, p.time)}
+    motion = best.output - best.output[p.used].mean()
+    for cause in apart:
+        with_it = motion * engine.added(best, cause)
+        shared = abs(with_it @ best.residual) / max(
+            np.linalg.norm(with_it) * np.linalg.norm(best.residual * p.used), 1e-300)
+        if shared > _WITH_MOTION:
+            found[cause] = (f"{shared**2:.0%} of what is left (power) goes with the motion times "
+                            "it: a gain that comes and goes so makes both of a motion with a mean")
     return found
 
 

@@ -42,8 +42,8 @@ class OtherAxes:
 
     def have(self, effect):
         """Whether the other axes have an effect too."""
-        return effect.common_to_axes or effect.of_reference or effect.cause in self.in_own_core \
-            or self._share(effect)
+        return effect.common_to_axes or (effect.of_reference and not effect.of_own_axis) \
+            or effect.cause in self.in_own_core or self._share(effect)
 
     def _share(self, effect):
         return (self.alike and is_of_all_if_alike(effect)) or (self.same_laws and is_law(effect))

@@ -47,7 +47,8 @@ def restored(reference, sensor, model, axis="x", temperature_at=None):
     links, on_base = AxisModel(Gain(), model.reference_faults).behind_base
     for i, recorded in enumerate(pair.reference.T):
         for fault in on_base:
-            recorded = fault.change_base(recorded, rate)
+            if i == column or not fault.of_own_axis:
+                recorded = fault.change_base(recorded, rate)
         convolution = Convolution(recorded - recorded[0], rate)
         values[:, i] = convolution.response(links.transfer_function(convolution.s)) + recorded[0]
     early_s = -sum(fault.pure_delay_s() for fault in model.reference_faults)

@@ -132,7 +132,7 @@ def _draw(rng, seed, causes, duration_s, times_noise):
             spikes=around.spikes and (around.spikes[0], around.spikes[1] * sensor_noise))
     except FloatingPointError:
         return None
-    besides = {**partly_true(effects), **_noticeable(besides, bench)}
+    besides = {**partly_true(effects), **besides}
     if around.spikes:
         besides["interference_bursts"] = {}  # short and strong, whatever they are called
     baseline = model_in_use(core, effects)
@@ -221,11 +221,3 @@ def _besides(around, core, rate_hz, reference_noise):
     if around.skew_ppm:
         besides["clock_skew"] = {"skew_ppm": around.skew_ppm}
     return besides
-
-
-def _noticeable(besides, bench):
-    """Without the noise and the lattice that are hardly a tenth of the noise's power."""
-    powers = {"reference_noise": lambda own: (bench.noise_gain * own["std"]) ** 2,
-              "quantization": lambda own: own["step"] ** 2 / 12}
-    return {cause: own for cause, own in besides.items()
-            if cause not in powers or powers[cause](own) > 0.1 * bench.noise_std ** 2}

@@ -113,6 +113,8 @@ class Effect:
     # True for what happened to the recorded reference alone: its link turns that back into the
     # motion, no correction knows of it, and a model file has it among the `reference_faults`
     of_reference: ClassVar[bool] = False
+    # True for such a fault that says what one axis of the reference has, and nothing of the others
+    of_own_axis: ClassVar[bool] = False
     # another cause that says the same with the other sign; where both do, this one is named
     mirrors: ClassVar[str | None] = None
     # True for what a record shows by itself (`of_record`, `reading`), and no fit looks for

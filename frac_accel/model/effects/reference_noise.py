@@ -20,6 +20,8 @@ class ReferenceNoise(Effect):
     cause = "reference_noise"
     stage = REFERENCE
     of_reference = True
+    # the motion of another axis has another spectrum
+    of_own_axis = True
     read_off = True
     explanation = ("The reference has noise of its own, which the sensor does not have: a fit to "
                    "it as it is finds less gain and other motion than there is.")

@@ -12,6 +12,11 @@ from .fit_starts import matching, of_orders
 _MOST = 16
 # Share of a motion's size below which it is taken as lost: to undo more would raise noise only.
 _LOST = 0.1
+# Share of a motion's size of which nothing is seen in a reference's noise, lines at least that tell
+# this noise; and what is still turned back of a motion whose power, over some lines, is so many
+# times that of the noise.
+_NOTHING, _TELL = 2e-3, 32
+_LEAST, _LINES, _STANDS_OUT = 0.01, 9, 10.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,7 +25,8 @@ class ReferenceSmoothing(Effect):
 
     :math:`\mathrm{sinc}(L f)^n` of the motion is recorded, without a delay: how late a reference
     is besides, `reference_delay` tells. The record is divided by that; where less than a tenth was
-    left of a motion, it stays lost.
+    left of a motion, it stays lost, but for what stands far out of the reference's noise there, such
+    as an engine's tone.
     """
 
     cause = "reference_smoothing"
@@ -39,18 +45,26 @@ class ReferenceSmoothing(Effect):
         room = int(np.ceil(self.order * self.length_s * sampling_rate_hz))
         padded = np.pad(values, room, mode="edge")
         length = next_fast_len(len(padded) + room, real=True)
-        turned_back = self._turned_back(rfftfreq(length, 1 / sampling_rate_hz))
+        frequency_hz = rfftfreq(length, 1 / sampling_rate_hz)
         level = values.mean()
-        return level + irfft(turned_back * rfft(padded - level, length), length)[
-            room:room + len(values)]
+        lines = rfft(padded - level, length)
+        kept = self._kept(frequency_hz)
+        # without what the ends leave everywhere
+        power = np.abs(rfft((padded - level) * np.hanning(len(padded)), length))**2
+        turned_back = np.where(_stands_out(power, kept), 1 / np.where(kept == 0, 1.0, kept),
+                               self._turned_back(frequency_hz))
+        return level + irfft(turned_back * lines, length)[room:room + len(values)]
 
     def transfer_function(self, s):
         # of the frequency axis, as `change_base` does it: it has no phase that damping could bend
         return self._turned_back(np.imag(s) / (2 * np.pi)).astype(complex)
 
     def _turned_back(self, frequency_hz):
-        kept = np.sinc(self.length_s * frequency_hz)**self.order
+        kept = self._kept(frequency_hz)
         return kept / np.maximum(kept**2, _LOST**2)
+
+    def _kept(self, frequency_hz):
+        return np.sinc(self.length_s * frequency_hz)**self.order
 
     def alternatives(self):
         return of_orders(self, (self.order - 1, self.order + 1, 2 * self.order), _MOST)
@@ -60,3 +74,15 @@ class ReferenceSmoothing(Effect):
         return matching(view, [
             cls(float(length), order) for length in np.geomspace(0.3, 100, 80) / view.rate
             for order in (1, 2, 4, 16)])
+
+
+def _stands_out(power, kept):
+    """Which lines of a power spectrum show motion although little of it was left: they stand far out
+    of those where nothing was left."""
+    from scipy.ndimage import uniform_filter1d
+    nothing = np.abs(kept) < _NOTHING
+    if nothing.sum() < _TELL:
+        return np.zeros(len(power), bool)
+    noise = power[nothing].mean()
+    return (np.abs(kept) < _LOST) & (np.abs(kept) > _LEAST) \
+        & (uniform_filter1d(power, _LINES) > _STANDS_OUT * noise)
