@@ -15,6 +15,32 @@ RATE = 100.0
 
 
 @pytest.mark.parametrize("seed", range(3))
+def test_noise_of_one_axis_of_the_reference_filters_that_axis_only(seed):
+    """The motion across was guessed by what is there of the own axis's motion, and lost."""
+    rng = np.random.default_rng([42, seed])
+    motion = rng.normal(size=(6000, 3))
+    for axis, band_hz in enumerate(([0.3, 4.0], [0.5, 25.0], [0.5, 30.0])):
+        motion[:, axis] = sosfiltfilt(butter(2, band_hz, "band", fs=RATE, output="sos"),
+                                      motion[:, axis])
+    motion /= motion.std(axis=0)
+    shares = rng.uniform(0.1, 0.3, 2) * rng.choice([-1, 1], 2)
+    sensor = motion + 0.01 * rng.normal(size=motion.shape)
+    sensor[:, 0] += motion[:, 1:] @ shares
+    noise = rng.uniform(0.08, 0.12)
+    reference = motion + noise * rng.normal(size=motion.shape)
+    stamps = np.round(np.arange(len(motion)) * 1e9 / RATE).astype(np.int64)
+    record = Samples.of(stamps, reference), Samples.of(stamps, sensor)
+    found = diagnose(record, SensorModel(Gain(1.0)), time_limit_s=60)
+    effects = {finding.cause: finding.effect for finding in found.findings}
+    assert effects.keys() == {"cross_axis_sensitivity", "reference_noise"}
+    across = effects["cross_axis_sensitivity"]
+    # noise of the other axes makes shares smaller by its part of what they move
+    np.testing.assert_allclose([across.y, across.z], shares, rtol=0.03)
+    assert validate(record, found.model).whole_nrmse == pytest.approx(
+        found.extended["nrmse"], rel=0.2)
+
+
+@pytest.mark.parametrize("seed", range(3))
 def test_shares_of_other_axes_describe_what_hides_behind_more(seed):
     """Two gyroscopes of one body: 3.2 % was left, of which 68 % came across, and 1.3 % is
     possible. Here as much comes across from accelerations, which no cause has, as shares make."""

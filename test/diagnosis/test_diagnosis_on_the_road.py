@@ -22,6 +22,8 @@ def names(case):
     (7_660_000, "timestamp_jitter"),     # of stamps whose values were put on other instants
     (9_160_000, "ac_coupling"),          # beside a lead of a thousandth of an interval
     (9_160_000, "mounting_resonance"),   # a motion guessed from a noisy reference leaves bursts
+    (9_260_000, "sampling_jitter"),      # on a lattice that makes values repeat, as a poll does
+    (9_260_000, "reference_smoothing"),  # an engine's tone by a notch of the average
 ])
 def test_named_on_the_road(seed, cause):
     case = draw_road_case(seed, [cause])
@@ -74,3 +76,21 @@ def test_named_beside_instants_that_scatter(seed, cause):
     found, result = names(draw_case(seed, [cause, "sampling_jitter"]))
     assert found == {cause, "sampling_jitter"}
     assert result.verdict == "explained"
+
+
+@pytest.mark.thorough
+def test_instants_that_scatter_show_beside_clipping_on_two_grids():
+    """What stands in for clipped samples is off where the motion is fast, and the filter to the
+    band lets it through on either side."""
+    case = draw_road_case(9_170_017, ["clipping", "sampling_jitter", "thermal_offset"])
+    found, _ = names(case)
+    assert case.causes <= found <= case.causes | set(case.besides)
+
+
+@pytest.mark.thorough
+def test_a_tone_of_a_gain_that_comes_and_goes_has_no_name():
+    case = draw_road_case(9_290_000, ["gain_modulation"])
+    found, result = names(case)
+    assert not found - set(case.besides)
+    reasons = {cause: each["reason"] for each in result.suspects for cause in each["causes"]}
+    assert "goes with the motion times it" in reasons["tone_interference"]

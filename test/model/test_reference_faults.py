@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 from exact_sines import RATE, oscillator, record, samples
+from scipy.optimize import brentq
 
 from frac_accel import Corrector, diagnose
 from frac_accel.errors import ModelError
 from frac_accel.model import SensorModel
+from frac_accel.model.effects.reference_smoothing import ReferenceSmoothing
 from frac_accel.validation import validate
 
 FAULTS = {
@@ -89,3 +91,28 @@ def test_a_model_with_the_fault_is_consistent():
     fault = {"cause": "reference_low_pass", "corner_hz": value}
     found = diagnose(samples(*pair), model(core, reference_faults=[fault]))
     assert not found.findings and not found.suspects
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_tone_by_the_notch_of_an_average_is_turned_back_and_noise_is_not(seed):
+    rng = np.random.default_rng([48, seed])
+    rate, n = 200.0, 20_000
+    length_s, order, noise = rng.uniform(0.018, 0.026), int(rng.integers(1, 4)), 1e-4
+    effect = ReferenceSmoothing(length_s, order)
+    # strong slow motion, and a tone of which a fiftieth to a twelfth is left
+    share = rng.uniform(0.02, 0.08)
+    tone_hz = brentq(lambda hz: np.sinc(length_s * hz)**order - share, 1.0, 1 / length_s)
+    time = np.arange(n) / rate
+    waves = [(rng.uniform(0.5, 5.0), 1.0), (tone_hz, 0.3)]
+    phases = rng.uniform(0, 2 * np.pi, 2)
+    motion = sum(size * np.sin(2 * np.pi * hz * time + phase)
+                 for (hz, size), phase in zip(waves, phases))
+    recorded = sum(size * np.sinc(length_s * hz)**order * np.sin(2 * np.pi * hz * time + phase)
+                   for (hz, size), phase in zip(waves, phases)) + noise * rng.normal(size=n)
+    inner = slice(200, -200)
+    back = effect.change_base(recorded, rate)
+    # of 0.2 that were lost; the ends leave a part of this
+    assert np.std((back - motion)[inner]) < 0.02
+    # beyond the notches nothing but noise: as large as where a tenth is left, at most
+    alone = effect.change_base(noise * rng.normal(size=n), rate)
+    assert np.std(alone[inner]) < 10 * noise

@@ -25,8 +25,8 @@ class ReferenceSmoothing(Effect):
 
     :math:`\mathrm{sinc}(L f)^n` of the motion is recorded, without a delay: how late a reference
     is besides, `reference_delay` tells. The record is divided by that; where less than a tenth was
-    left of a motion, it stays lost, but for what stands far out of the reference's noise there, such
-    as an engine's tone.
+    left of a motion, it stays lost, but for what stands far out of the reference's noise there,
+    such as an engine's tone.
     """
 
     cause = "reference_smoothing"
@@ -77,8 +77,8 @@ class ReferenceSmoothing(Effect):
 
 
 def _stands_out(power, kept):
-    """Which lines of a power spectrum show motion although little of it was left: they stand far out
-    of those where nothing was left."""
+    """Which lines of a power spectrum show motion although little of it was left: they stand far
+    out of those where nothing was left."""
     from scipy.ndimage import uniform_filter1d
     nothing = np.abs(kept) < _NOTHING
     if nothing.sum() < _TELL:
