@@ -55,7 +55,7 @@ def band_limited(values, rate_hz, start_s, target_hz, target_start_s, count):
 
     Parameters
     ----------
-    values : ndarray, shape (n, 3)
+    values : ndarray, shape (n, m)
     rate_hz, start_s : float
         Rate and instant of the first sample.
     target_hz, target_start_s : float
@@ -64,7 +64,7 @@ def band_limited(values, rate_hz, start_s, target_hz, target_start_s, count):
 
     Returns
     -------
-    ndarray, shape (count, 3)
+    ndarray, shape (count, m)
         Meaningless closer than `REACH` intervals of the lower rate to the ends of `values`.
     """
     from scipy.ndimage import map_coordinates

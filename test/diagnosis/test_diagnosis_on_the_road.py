@@ -78,6 +78,13 @@ def test_named_beside_instants_that_scatter(seed, cause):
     assert result.verdict == "explained"
 
 
+def test_a_poll_shows_within_what_a_slower_reference_shows():
+    """What it adds was folded down where it was put on the record's instants."""
+    case = draw_road_case(9_270_014, ["dropped_samples", "polled_readout"])
+    found, _ = names(case)
+    assert case.causes <= found <= case.causes | set(case.besides)
+
+
 @pytest.mark.thorough
 def test_instants_that_scatter_show_beside_clipping_on_two_grids():
     """What stands in for clipped samples is off where the motion is fast, and the filter to the
