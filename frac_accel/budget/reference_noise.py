@@ -23,6 +23,9 @@ _LONGEST = 1024
 # Power of the noise, of the reference's, below which it bends no fit, and above which nothing is
 # said.
 _LEAST, _MOST = 1e-4, 0.1
+# Share of the sensor's own noise (power) that a guess of the motion takes where it has none, from
+# which any filter bends to do the same, however little of the reference's power that is.
+_TAKEN = 0.01
 # Quantile of the density that white noise cannot exceed, and by how much an estimate may.
 _FLOOR, _SCATTERS = 0.05, 1.3
 # A floor: coherence with the sensor below which nothing is shared, share of the frequencies that
@@ -115,10 +118,10 @@ def reference_noise(record, column, used, covariance_std=None, transfer_function
     inner = _inner(frequency, record)
     power = float(np.var(one))
     most = np.quantile(own[inner], _FLOOR)
-    for density, by, matters in _estimates(record, column, used, covariance_std, own_rate, most,
-                                           size, (frequency, own), transfer_function):
+    for density, by, matters, taken in _estimates(record, column, used, covariance_std, own_rate,
+                                                  most, size, (frequency, own), transfer_function):
         std = np.sqrt(density * own_rate / 2)
-        bends = density * rate / 2 / power > _LEAST
+        bends = density * rate / 2 / power > _LEAST or taken > _TAKEN
         if density <= _SCATTERS**2 * most and density * rate / 2 / power < _MOST \
                 and (bends or matters):
             share = np.clip(1 - density / own, 0.0, 1.0)
@@ -147,8 +150,9 @@ def _inner(frequency, record):
 
 def _estimates(record, column, used, covariance_std, own_rate, most, size, spectrum,
                transfer_function):
-    """Densities [(m/s²)²/Hz], what shows them and whether they matter though they bend no fit, the
-    best first.
+    """Densities [(m/s²)²/Hz], what shows them, whether they matter though they bend no fit, and the
+    share of the sensor's noise that a guess of the motion takes as far as that is known, the best
+    first.
 
     `own_rate` [Hz] is that at which the reference was sampled, `most` its lowest density,
     `spectrum` its frequencies and densities.
@@ -159,23 +163,23 @@ def _estimates(record, column, used, covariance_std, own_rate, most, size, spect
         for std, by in ((_periods(one, used, recognise(one, rate).period_samples), "periods"),
                         (_at_rest(one, two, used, rate), "rest")):
             if std is not None:
-                yield 2 * std**2 / rate, by, True
+                yield 2 * std**2 / rate, by, True, 0.0
     if _given(covariance_std) and not _untrusted(covariance_std, None,
                                                  _SCATTERS * np.sqrt(most * own_rate / 2)):
-        yield 2 * covariance_std**2 / own_rate, "covariance", True
+        yield 2 * covariance_std**2 / own_rate, "covariance", True, 0.0
     other = welch(two, rate, nperseg=size)[1]
     shared = np.abs(csd(one, two, rate, nperseg=size)[1])
     inner = _inner(spectrum[0], record)
     spectra = [values[inner] for values in (*spectrum, other, shared)]
     median = welch(one, rate, nperseg=size, average="median")[1][inner]
     segments = len(one) / size
-    floor, is_heard = _floor(*spectra[1:], median, segments)
+    floor, is_heard, taken = _floor(*spectra[1:], median, segments)
     # an excess that bends nothing may be some other small thing
-    for density, by, matters in (
-            (floor, "floor", is_heard),
-            (_excess(*spectra, segments, transfer_function), "excess", False)):
+    for density, by, matters, share in (
+            (floor, "floor", is_heard, taken),
+            (_excess(*spectra, segments, transfer_function), "excess", False, 0.0)):
         if density is not None and not _is_shared(density, *spectra[1:]):
-            yield density, by, matters
+            yield density, by, matters, share
 
 
 def _is_shared(density, own, other, shared):
@@ -205,8 +209,9 @@ def _at_rest(one, two, used, rate):
 
 
 def _floor(own, other, shared, median, segments):
-    """An even density of the reference at frequencies where the sensor has none of it, or None; and
-    whether the sensor is quiet enough there to show motion of that density.
+    """An even density of the reference at frequencies where the sensor has none of it, or None;
+    whether the sensor is quiet enough there to show motion of that density; and the share of its
+    own noise that nothing in the density's place would take.
 
     Parameters
     ----------
@@ -218,11 +223,11 @@ def _floor(own, other, shared, median, segments):
     """
     # one that most segments do not have is that of a few spikes
     if np.quantile(median, _FLOOR) < _STEADY * np.quantile(own, _FLOOR):
-        return None, False
+        return None, False, 0.0
     coherence = shared**2 / np.maximum(own * other, 1e-300)
     apart, together = coherence < _SHARED, coherence > 0.9
     if apart.mean() < _WIDE or not together.any():
-        return None, False
+        return None, False, 0.0
     low, high = np.quantile(own[apart], (0.1, 0.9))
     density = np.median(own[apart])
     gain = np.median(shared[together] / own[together])
@@ -231,8 +236,8 @@ def _floor(own, other, shared, median, segments):
     is_heard = bool(expected * _LOUDEST >= 1)
     if high > _EVEN * low \
             or not is_heard and coherence[apart].mean() - chance > _ABSENT * expected:
-        return None, False
-    return float(density), is_heard
+        return None, False, 0.0
+    return float(density), is_heard, float(min(expected, 1.0) * apart.mean())
 
 
 def _excess(frequency, own, other, shared, segments, transfer_function):
