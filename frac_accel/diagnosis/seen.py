@@ -283,12 +283,16 @@ def readings(engine, fitted, found, shown, wanted=lambda cls: True):
                     entry["part"]: entry["share"] for entry in engine.budget(fitted).parts
                     if entry["ci95"][0] > 0},
                 lambda: _unguessed(p, fitted, here))
-    for cause, cls in known_effects().items():
+    # what is known of each sample is no noise for others
+    first = sorted(known_effects().items(), key=lambda entry: not entry[1].known_by_sample)
+    for cause, cls in first:
         if not (cls.read_off or cause in shown) or not wanted(cls):
             continue
         recognised = cls.recognised(seen, shown.get(cause))
         if recognised is not None:
             yield cause, *recognised
+            if recognised[1].added is not None:
+                seen = dataclasses.replace(seen, measured=seen.measured - recognised[1].added)
 
 
 def _unguessed(problem, fitted, here):

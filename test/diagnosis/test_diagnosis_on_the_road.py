@@ -86,6 +86,20 @@ def test_a_poll_shows_within_what_a_slower_reference_shows():
 
 
 @pytest.mark.thorough
+def test_noise_of_the_reference_that_the_sensor_drowns_is_no_low_pass():
+    """Beside a clock that runs off filters were tried until the time was over."""
+    case = draw_road_case(9_360_000, ["clock_skew"])
+    found, _ = names(case)
+    assert case.causes <= found <= case.causes | set(case.besides)
+
+
+@pytest.mark.thorough
+def test_a_poll_on_a_lattice_is_no_scatter_of_the_instants():
+    found, _ = names(draw_road_case(9_360_000, ["polled_readout"]))
+    assert "polled_readout" in found and "sampling_jitter" not in found
+
+
+@pytest.mark.thorough
 def test_instants_that_scatter_show_beside_clipping_on_two_grids():
     """What stands in for clipped samples is off where the motion is fast, and the filter to the
     band lets it through on either side."""
