@@ -43,6 +43,8 @@ PARTLY = {
     "batched_stamps": ("time_delay", "timestamp_jitter"),   # its mean and the rest
     # a read-out of the nearest value instead of the last; its pattern may pass for chance
     "resampling_glitches": ("sampling_jitter", "polled_readout"),
+    # a drift with a course of its own
+    "wandering_offset": ("offset_drift",),
 }
 
 
