@@ -20,11 +20,11 @@ from .noise import _given, _periods, _untrusted
 
 _SEGMENTS = 32
 _LONGEST = 1024
-# Power of the noise, of the reference's, below which it bends no fit, and above which nothing is
-# said.
+# Power of the noise, of the reference's, below which it bends no fit alone and has no name, and
+# above which nothing is said.
 _LEAST, _MOST = 1e-4, 0.1
-# Share of the sensor's own noise (power) that a guess of the motion takes where it has none, from
-# which any filter bends to do the same, however little of the reference's power that is.
+# Share of the noise of a louder sensor (power) that a guess of the motion takes where it has none,
+# from which any filter bends to do the same, however little of the reference's power that is.
 _TAKEN = 0.01
 # Quantile of the density that white noise cannot exceed, and by how much an estimate may.
 _FLOOR, _SCATTERS = 0.05, 1.3
@@ -64,6 +64,8 @@ class ReferenceNoise:
     by : {"periods", "rest", "covariance", "floor", "excess"}
     bends : bool
         Whether it is enough to bend a fit; else it counts as noise only.
+    is_much : bool
+        Whether it is enough of the reference to be more than every instrument has.
     frequency_hz, share : tuple of float
         W at some frequencies.
     band_hz : float
@@ -74,6 +76,7 @@ class ReferenceNoise:
     uncertainty: float
     by: str
     bends: bool
+    is_much: bool
     frequency_hz: tuple
     share: tuple
     band_hz: float = np.inf
@@ -121,9 +124,9 @@ def reference_noise(record, column, used, covariance_std=None, transfer_function
     for density, by, matters, taken in _estimates(record, column, used, covariance_std, own_rate,
                                                   most, size, (frequency, own), transfer_function):
         std = np.sqrt(density * own_rate / 2)
-        bends = density * rate / 2 / power > _LEAST or taken > _TAKEN
-        if density <= _SCATTERS**2 * most and density * rate / 2 / power < _MOST \
-                and (bends or matters):
+        part = density * rate / 2 / power
+        bends = part > _LEAST or taken > _TAKEN
+        if density <= _SCATTERS**2 * most and part < _MOST and (bends or matters):
             share = np.clip(1 - density / own, 0.0, 1.0)
             # a constant is no noise, and the first line holds what the window leaves of it
             share[:2] = 1.0, share[2]
@@ -136,7 +139,7 @@ def reference_noise(record, column, used, covariance_std=None, transfer_function
             # as far as its own Nyquist frequency
             ends = (frequency[-1], own_rate / 2) if own_rate > rate else (own_rate / 2,)
             return ReferenceNoise(
-                float(std), float(known * std), by, bool(bends),
+                float(std), float(known * std), by, bool(bends), bool(part > _LEAST),
                 (*frequency[frequency < ends[0]].tolist(), *ends),
                 (*share[frequency < ends[0]].tolist(), *[float(share[-1])] * len(ends)),
                 record.band_hz or np.inf)
@@ -210,8 +213,8 @@ def _at_rest(one, two, used, rate):
 
 def _floor(own, other, shared, median, segments):
     """An even density of the reference at frequencies where the sensor has none of it, or None;
-    whether the sensor is quiet enough there to show motion of that density; and the share of its
-    own noise that nothing in the density's place would take.
+    whether the sensor is quiet enough there to show motion of that density; and where it is not,
+    the share of its noise that nothing in the density's place would take.
 
     Parameters
     ----------
@@ -237,7 +240,7 @@ def _floor(own, other, shared, median, segments):
     if high > _EVEN * low \
             or not is_heard and coherence[apart].mean() - chance > _ABSENT * expected:
         return None, False, 0.0
-    return float(density), is_heard, float(min(expected, 1.0) * apart.mean())
+    return float(density), is_heard, 0.0 if is_heard else float(expected * apart.mean())
 
 
 def _excess(frequency, own, other, shared, segments, transfer_function):

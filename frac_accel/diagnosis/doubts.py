@@ -102,6 +102,9 @@ _EDGE = 0.95
 # Correlation of what is left with the motion times what a cause adds that should have nothing to do
 # with it, from which a gain that comes and goes may have made both.
 _WITH_MOTION = 0.3
+# Share of the motion on either side of zero that tells its gains apart, part of what is left (RMS)
+# that must go with its size, and of a gain's change from which that is one of one side.
+_EACH_SIDE, _SIDED, _OF_GAIN = 0.1, 0.5, 0.3
 # Damping ratio below which a link has a peak, and times what is left within half an octave of it
 # (RMS) that it must then take.
 _PEAKED, _AT_PEAK = 0.1, 10.0
@@ -200,6 +203,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **_may_be_the_sensor(engine, best),
                          **_rings_otherwise(engine, best, takes, noise),
                          **_nothing_at_its_peak(engine, best),
+                         **_by_sign(engine, best, added),
                          **_corrections(engine, best, takes)}.items():
         doubts.setdefault(cause, words)
     if gains and (left.share > 0 or not engine.is_accounted(best, noise)):
@@ -593,6 +597,27 @@ def _parts_of_a_law(best, takes, added, left):
                 words = (f"{shift} and {law} do nearly the same: together they may be another law "
                          "of the force")
                 found |= {shift: words, law: words}
+    return found
+
+
+def _by_sign(engine, best, added):
+    """Gains that are not the same for motion to both sides: what is left goes with its size."""
+    p, found = engine.problem, {}
+    gains = [cause for cause in added if best.effects[cause].is_constant]
+    motion = best.output[p.used]
+    if not gains or not _EACH_SIDE < np.mean(motion > 0) < 1 - _EACH_SIDE:
+        return found
+    forces = [values for cause, values in added.items() if acts_on_spring(best.effects[cause])]
+    left = (best.residual + sum(forces))[p.used]
+    line = np.stack([np.ones(len(motion)), motion], axis=1)
+    size = np.abs(motion) - line @ np.linalg.lstsq(line, np.abs(motion), rcond=None)[0]
+    off = left @ size / (size @ size)
+    if abs(off) * np.linalg.norm(size) < _SIDED * np.linalg.norm(left):
+        return found
+    for cause in gains:
+        if abs(off) > _OF_GAIN * engine.rms(added[cause]) / engine.rms(best.output):
+            found[cause] = (f"the gain differs by {2 * abs(off):.2g} between motion to one side "
+                            "and to the other: one number is not what changed")
     return found
 
 

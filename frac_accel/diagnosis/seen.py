@@ -284,8 +284,8 @@ def readings(engine, fitted, found, shown, wanted=lambda cls: True):
                     if entry["ci95"][0] > 0},
                 lambda: _unguessed(p, fitted, here))
     # what is known of each sample is no noise for others
-    first = sorted(known_effects().items(), key=lambda entry: not entry[1].known_by_sample)
-    for cause, cls in first:
+    ordered = sorted(known_effects().items(), key=lambda entry: not entry[1].known_by_sample)
+    for cause, cls in ordered:
         if not (cls.read_off or cause in shown) or not wanted(cls):
             continue
         recognised = cls.recognised(seen, shown.get(cause))

@@ -115,3 +115,12 @@ def test_a_tone_of_a_gain_that_comes_and_goes_has_no_name():
     assert not found - set(case.besides)
     reasons = {cause: each["reason"] for each in result.suspects for cause in each["causes"]}
     assert "goes with the motion times it" in reasons["tone_interference"]
+
+
+@pytest.mark.thorough
+def test_a_gain_that_differs_by_the_side_is_no_one_gain():
+    case = draw_road_case(9_390_000, ["asymmetric_gain"])
+    found, result = names(case)
+    assert not found - set(case.besides)
+    reasons = {cause: each["reason"] for each in result.suspects for cause in each["causes"]}
+    assert "to one side" in reasons["sensitivity_error"]

@@ -49,4 +49,6 @@ class ReferenceNoise(Effect):
     def reading(self, seen):
         """What it explains, a fit without it tells: here the error is what that with it leaves."""
         noise, error = seen.found.reference_noise, (seen.measured - seen.output)[seen.used]
-        return Reading({"std": noise.uncertainty}, error, error, noise.words)
+        # as little as every instrument has is no fault
+        return Reading({"std": noise.uncertainty}, error, error, noise.words) \
+            if noise.is_much else None
