@@ -147,3 +147,17 @@ def test_what_is_held_to_be_needed_is_needed(seed):
     assert needed and names == [name for name in names if name not in needed]
     for cause in needed:
         assert search.without(best, cause).cost > goal
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_filter_that_joins_a_delay_begins_no_later_than_both(seed):
+    """It stood beside all of the delay that had stood for it, too late by as much as it is late,
+    and a trial of a few steps did not come back."""
+    search = searched(seed, Clock())
+    delayed = search.fit({"time_delay": EFFECTS["time_delay"](0.004)})
+    begun = {cause: search.begun(delayed, cause, begin)
+             for _, cause, begin in search.screen(delayed)}
+    filters = {"low_pass_lag", "linear_phase_filter", "low_pass_filter"} & begun.keys()
+    assert filters
+    for cause in filters:
+        assert search.problem.cost(begun[cause]) < 1.2 * delayed.cost
