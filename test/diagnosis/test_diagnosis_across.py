@@ -14,6 +14,7 @@ from frac_accel.report.diagnosis import diagnosis_page
 RATE = 100.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", range(3))
 def test_noise_of_one_axis_of_the_reference_filters_that_axis_only(seed):
     """The motion across was guessed by what is there of the own axis's motion, and lost."""

@@ -23,7 +23,8 @@ def names(case):
     (9_160_000, "ac_coupling"),          # beside a lead of a thousandth of an interval
     (9_160_000, "mounting_resonance"),   # a motion guessed from a noisy reference leaves bursts
     (9_260_000, "sampling_jitter"),      # on a lattice that makes values repeat, as a poll does
-    (9_260_000, "reference_smoothing"),  # an engine's tone by a notch of the average
+    # an engine's tone by a notch of the average
+    pytest.param(9_260_000, "reference_smoothing", marks=pytest.mark.thorough),
 ])
 def test_named_on_the_road(seed, cause):
     case = draw_road_case(seed, [cause])
