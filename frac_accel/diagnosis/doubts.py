@@ -197,7 +197,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
                          **_beside_a_strong_force(engine, best, takes, left, noise),
                          **_within_steps(engine, best, takes, added),
                          **_hardly_more(engine, best, left), **_beyond_the_motion(engine, best),
-                         **_of_motion(engine, best), **_of_a_further_mode(engine, best),
+                         **_of_motion(engine, best, added), **_of_a_further_mode(engine, best),
                          **_at_the_edge(engine, best), **_hardly_rings(engine, best),
                          **_out_of_sight(engine, best), **_undoes_the_core(engine, best),
                          **_may_be_the_sensor(engine, best),
@@ -899,7 +899,7 @@ def _corner_hz(effect, edge_hz):
     return float(frequency[np.argmax(size)]) if size.any() else np.inf
 
 
-def _of_motion(engine, best):
+def _of_motion(engine, best, added):
     """Causes that should have nothing to do with the motion, but may have."""
     apart = {cause: effect for cause, effect in best.effects.items()
              if type(effect).may_be_of is not Effect.may_be_of}
@@ -916,8 +916,8 @@ def _of_motion(engine, best):
         found |= {cause: words for cause, effect in apart.items()
                   if effect.may_be_of(motion, p.time)}
     motion = best.output - best.output[p.used].mean()
-    for cause in apart:
-        with_it = motion * engine.added(best, cause)
+    for cause in apart.keys() & added.keys():
+        with_it = motion * added[cause]
         shared = abs(with_it @ best.residual) / max(
             np.linalg.norm(with_it) * np.linalg.norm(best.residual * p.used), 1e-300)
         if shared > _WITH_MOTION:

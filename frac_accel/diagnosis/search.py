@@ -385,16 +385,17 @@ class Search:
         """Effects with their delay moved by as much as what joins a fit makes its output later,
         where that is nearer: a trial of a few steps would not come back from there."""
         p, cause = self.problem, IDENTIFIED["delay_s"].cause
-        if cause not in effects or any(map(acts_on_spring, effects.values())) \
-                or p.cost(effects, rough=True) < _OVERSHOT * fitted.cost:
+        if cause not in effects or any(map(acts_on_spring, effects.values())):
+            return effects
+        cost = p.cost(effects, rough=True)
+        if cost < _OVERSHOT * fitted.cost:
             return effects
         slope = np.gradient(fitted.simulated)[p.used]
         away = (p.simulate(effects) - fitted.simulated)[p.used]
         late_s = -float(away @ slope / max(slope @ slope, 1e-300)) / p.rate
         sooner = self._later(effects, -late_s)
         moved = {**effects, **sooner}
-        return moved if sooner and p.cost(moved, rough=True) < p.cost(effects, rough=True) \
-            else effects
+        return moved if sooner and p.cost(moved, rough=True) < cost else effects
 
     def _centred(self, effects):
         """Effects with their constant moved where it must be, if that is farther than a step of a

@@ -13,6 +13,16 @@ def names(case):
     return {finding.cause for finding in found.findings}, found
 
 
+def assert_named(case):
+    found, _ = names(case)
+    assert case.causes <= found <= case.causes | set(case.besides)
+
+
+def reasons(result):
+    """Why each suspect has no name."""
+    return {cause: each["reason"] for each in result.suspects for cause in each["causes"]}
+
+
 @pytest.mark.parametrize("seed, cause", [
     (7_160_000, "quantization"),         # of values that were put on other instants
     (7_160_000, "interference_bursts"),
@@ -28,8 +38,7 @@ def names(case):
 ])
 def test_named_on_the_road(seed, cause):
     case = draw_road_case(seed, [cause])
-    found, _ = names(case)
-    assert case.causes <= found <= case.causes | set(case.besides)
+    assert_named(case)
 
 
 @pytest.mark.thorough
@@ -53,8 +62,7 @@ def test_what_scattered_stamps_leave_open_is_no_other_cause():
     """A skew that the stamps do not rule out had no name, and a stiffness that drifts took its
     place."""
     case = draw_road_case(9_160_001, ["timestamp_jitter"])
-    found, _ = names(case)
-    assert case.causes <= found <= case.causes | set(case.besides)
+    assert_named(case)
 
 
 def test_noise_of_the_reference_that_shows_nowhere_is_no_filter_without_a_delay():
@@ -82,16 +90,14 @@ def test_named_beside_instants_that_scatter(seed, cause):
 def test_a_poll_shows_within_what_a_slower_reference_shows():
     """What it adds was folded down where it was put on the record's instants."""
     case = draw_road_case(9_270_014, ["dropped_samples", "polled_readout"])
-    found, _ = names(case)
-    assert case.causes <= found <= case.causes | set(case.besides)
+    assert_named(case)
 
 
 @pytest.mark.thorough
 def test_noise_of_the_reference_that_the_sensor_drowns_is_no_low_pass():
     """Beside a clock that runs off filters were tried until the time was over."""
     case = draw_road_case(9_360_000, ["clock_skew"])
-    found, _ = names(case)
-    assert case.causes <= found <= case.causes | set(case.besides)
+    assert_named(case)
 
 
 @pytest.mark.thorough
@@ -105,8 +111,7 @@ def test_instants_that_scatter_show_beside_clipping_on_two_grids():
     """What stands in for clipped samples is off where the motion is fast, and the filter to the
     band lets it through on either side."""
     case = draw_road_case(9_170_017, ["clipping", "sampling_jitter", "thermal_offset"])
-    found, _ = names(case)
-    assert case.causes <= found <= case.causes | set(case.besides)
+    assert_named(case)
 
 
 @pytest.mark.thorough
@@ -114,8 +119,7 @@ def test_a_tone_of_a_gain_that_comes_and_goes_has_no_name():
     case = draw_road_case(9_290_000, ["gain_modulation"])
     found, result = names(case)
     assert not found - set(case.besides)
-    reasons = {cause: each["reason"] for each in result.suspects for cause in each["causes"]}
-    assert "goes with the motion times it" in reasons["tone_interference"]
+    assert "goes with the motion times it" in reasons(result)["tone_interference"]
 
 
 @pytest.mark.thorough
@@ -123,5 +127,4 @@ def test_a_gain_that_differs_by_the_side_is_no_one_gain():
     case = draw_road_case(9_390_000, ["asymmetric_gain"])
     found, result = names(case)
     assert not found - set(case.besides)
-    reasons = {cause: each["reason"] for each in result.suspects for cause in each["causes"]}
-    assert "to one side" in reasons["sensitivity_error"]
+    assert "to one side" in reasons(result)["sensitivity_error"]

@@ -49,19 +49,17 @@ class ReferenceSmoothing(Effect):
         level = values.mean()
         lines = rfft(padded - level, length)
         kept = self._kept(frequency_hz)
-        # without what the ends leave everywhere
-        power = np.abs(rfft((padded - level) * np.hanning(len(padded)), length))**2
-        turned_back = np.where(_stands_out(power, kept), 1 / np.where(kept == 0, 1.0, kept),
-                               self._turned_back(frequency_hz))
+        turned_back = _turned_back(kept)
+        if np.sum(np.abs(kept) < _NOTHING) >= _TELL:
+            # without what the ends leave everywhere
+            power = np.abs(rfft((padded - level) * np.hanning(len(padded)), length))**2
+            there = _stands_out(power, kept)
+            turned_back[there] = 1 / kept[there]
         return level + irfft(turned_back * lines, length)[room:room + len(values)]
 
     def transfer_function(self, s):
         # of the frequency axis, as `change_base` does it: it has no phase that damping could bend
-        return self._turned_back(np.imag(s) / (2 * np.pi)).astype(complex)
-
-    def _turned_back(self, frequency_hz):
-        kept = self._kept(frequency_hz)
-        return kept / np.maximum(kept**2, _LOST**2)
+        return _turned_back(self._kept(np.imag(s) / (2 * np.pi))).astype(complex)
 
     def _kept(self, frequency_hz):
         return np.sinc(self.length_s * frequency_hz)**self.order
@@ -76,13 +74,14 @@ class ReferenceSmoothing(Effect):
             for order in (1, 2, 4, 16)])
 
 
+def _turned_back(kept):
+    return kept / np.maximum(kept**2, _LOST**2)
+
+
 def _stands_out(power, kept):
     """Which lines of a power spectrum show motion although little of it was left: they stand far
     out of those where nothing was left."""
     from scipy.ndimage import uniform_filter1d
-    nothing = np.abs(kept) < _NOTHING
-    if nothing.sum() < _TELL:
-        return np.zeros(len(power), bool)
-    noise = power[nothing].mean()
+    noise = power[np.abs(kept) < _NOTHING].mean()
     return (np.abs(kept) < _LOST) & (np.abs(kept) > _LEAST) \
         & (uniform_filter1d(power, _LINES) > _STANDS_OUT * noise)
