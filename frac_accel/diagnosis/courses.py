@@ -64,10 +64,15 @@ def begun_with(engine):
 
 
 def _least_of_a_law(engine, effect):
-    """Least cost of a law in time of a course's kind, beside all common causes."""
+    """Least cost of a law in time of a course's kind beside all common causes, and of two such
+    laws, of which the other may be of any kind."""
     search = engine.search
     fit = _with_a_law(engine, search.everyday(search.baseline), effect)
-    return np.inf if fit is None else fit.cost
+    if fit is None:
+        return np.inf
+    both = search.fit_all([search.begun(fit, cause, begin) for _, cause, begin in search.screen(fit)
+                           if known_effects()[cause].shows_with_time])
+    return min(each.cost for each in (fit, *both))
 
 
 def is_a_law(engine, best, courses):
