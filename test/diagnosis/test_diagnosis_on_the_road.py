@@ -128,3 +128,14 @@ def test_a_gain_that_differs_by_the_side_is_no_one_gain():
     found, result = names(case)
     assert not found - set(case.besides)
     assert "to one side" in reasons(result)["sensitivity_error"]
+
+
+def test_two_laws_in_time_are_no_course():
+    """A course of the zero described both, and the search beside it took all of its time."""
+    assert_named(draw_road_case(9_370_000, ["gain_drift", "thermal_offset"]))
+
+
+def test_shocks_between_samples_that_are_shifted_are_no_bursts():
+    """What two instruments record of a shock of a moment depends on when they look."""
+    assert_named(draw_road_case(
+        9_370_017, ["offset_drift", "reference_delay", "timestamp_jitter"]))

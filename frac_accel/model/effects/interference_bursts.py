@@ -34,6 +34,9 @@ _ALL_ONE_SIDED = 0.6
 # Correlation of one sample with the next in bursts, from which they are smooth: no noise, but how
 # something settles, such as a filter that began anew.
 _SETTLES = 0.9
+# The same below which they ring from sample to sample: what the motion does within one, such as a
+# shock of a moment, is not what a shift by a part of a sample makes of it.
+_RINGS = -0.5
 # Share of the error budget that bursts must have, and where one topic was put on the other's
 # instants: there it lacks what is fast of the motion.
 _SHOWN, _SHOWN_RESAMPLED = 0.01, 0.5
@@ -88,7 +91,8 @@ class InterferenceBursts(Effect):
         mostly = share * (loud - noise) > _MOSTLY * np.mean(error**2)
         if len(starts) < (_FEWEST if mostly else _SEVERAL) or _going_on(error, noise) < _GOES_ON \
                 or _follows(inside, error, output, len(starts)) \
-                or _one_sided(error, inside) or _smooth(error, inside) > _SETTLES \
+                or _one_sided(error, inside) \
+                or not _RINGS < _smooth(error, inside) < _SETTLES \
                 or _grows(error, output) > _AS_GOOD * better:
             return None
         values, simulated, _ = seen.as_recorded()
