@@ -30,6 +30,8 @@ from .words import gain_words
 
 # Share of the baseline's excess power that may be left where causes are named.
 _LEFT = 0.03
+# The same where that is no more than this share of what is left, of which the budget sees nothing.
+_LEFT_UNSEEN, _UNSEEN = 0.1, 0.03
 # Largest deviation of a named cause's strength in parts of a record that holds something else too.
 _STEADY = 0.2
 # Share of what each named cause takes (RMS) up to which another one is minor; of a filter, which
@@ -120,11 +122,12 @@ def sure(engine, best, findings, tied, left, fraction):
     """The findings that stand where something is left; the model of these alone, with its
     uncertainties; and the others as suspects."""
     doubtful = set()
+    most = _LEFT_UNSEEN if left.share < _UNSEEN and not engine.structure(best) else _LEFT
     if left.share > 0:
         # something is left, which the causes may have been bent by, or mistaken for
         doubtful = {f.cause for f in findings if f.cause in best.effects
                     and not engine.stands_among_slow(best, f.cause, f.gain.taken)
-                    and (engine.unsteadiness(best, f.cause) > _STEADY or fraction > _LEFT
+                    and (engine.unsteadiness(best, f.cause) > _STEADY or fraction > most
                          and not engine.stands_in_its_kind(best, f.cause, f.gain.taken))}
     fitted, stds, dropped = refitted(engine, best, {f.cause for f in findings} - doubtful, tied)
     findings = [f for f in findings if f.cause not in doubtful and f.cause not in dropped]

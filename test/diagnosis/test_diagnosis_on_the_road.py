@@ -32,6 +32,7 @@ def reasons(result):
     (7_660_000, "timestamp_jitter"),     # of stamps whose values were put on other instants
     (9_160_000, "ac_coupling"),          # beside a lead of a thousandth of an interval
     (9_160_000, "mounting_resonance"),   # a motion guessed from a noisy reference leaves bursts
+    (9_460_000, "time_delay"),           # beside a clock that does less than the noise
     (9_260_000, "sampling_jitter"),      # on a lattice that makes values repeat, as a poll does
     # an engine's tone by a notch of the average
     pytest.param(9_260_000, "reference_smoothing", marks=pytest.mark.thorough),
