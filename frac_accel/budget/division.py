@@ -64,6 +64,9 @@ _COURSES = (1, 2, 4, 8, 16)
 # first must take any.
 _BETTER = 1.0
 _ANY = 2.0
+# Times the share that other axes have by chance of what has few independent frequencies, which the
+# first filter of theirs must take, and the most that this is.
+_BEYOND_CHANCE, _CHANCE_AT_MOST = 2.0, 0.5
 # Error of a fit to coloured noise, over that of one to white noise.
 _COLOURED = 4.0
 # Share of what a part is taken from that is worth a longer filter.
@@ -364,6 +367,7 @@ class _One:
         best = first = self.leading = None
         best_gain, left = np.zeros(len(self.r.blocks)), float(target @ target)
         worse, self.enough = 0, False
+        least = max(_WORTH, self._by_chance(target) if part == "across" else 0.0)
         for place, (name, size, make) in enumerate(self._candidates(part, target)):
             if part in self.chosen and name != self.chosen[part]:
                 continue
@@ -373,7 +377,8 @@ class _One:
                 first = name, predicted, size
             more = gains - best_gain
             error = np.sqrt(len(more)) * np.std(more)
-            if more.sum() > max((_BETTER if best else _ANY) * error, _WORTH * left):
+            if more.sum() > max((_BETTER if best else _ANY) * error,
+                                (_WORTH if best else least) * left):
                 best, best_gain, worse = (name, predicted, size), gains, 0
                 self.leading = name
             else:
@@ -391,6 +396,13 @@ class _One:
         _, estimate, self.sizes[part] = best or first
         self.taken[part] = float(best_gain.sum())
         return (estimate if best else np.zeros(self.r.n)), estimate
+
+    def _by_chance(self, target):
+        """Share of a target that other axes may have by chance: one weight each of the numbers that
+        its few strong frequencies are. Blocks of what wanders are not independent."""
+        power = np.abs(rfft(target))**2
+        numbers = 2 * power.sum()**2 / max(np.sum(power**2), 1e-300)
+        return min(_BEYOND_CHANCE * len(self.r.axes[1:]) / max(numbers, 1e-300), _CHANCE_AT_MOST)
 
     def _gains(self, part, target, predicted):
         """Power that a prediction takes of each block; of shapes, of what neither a slow course nor

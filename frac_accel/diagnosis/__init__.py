@@ -24,7 +24,7 @@ from ..record.clipping import at_limits
 from ..record.orientation import Orientation, turned_away
 from ..record.sources import pair_of
 from ..simulation import AxisSimulator
-from .courses import begun_with, beside, course_of, is_a_law, is_worth_it, refined
+from .courses import about_zero, begun_with, beside, course_of, is_a_law, is_worth_it, refined
 from .doubts import undone_mounts
 from .engine import Engine
 from .event import event, start
@@ -533,7 +533,7 @@ def _with_a_course(begin, engine, best, seed):
 def _beside_a_course(begin, engine, courses, effects):
     """Engine whose every fit has these courses, found once more beside the fit of some effects (or
     of the common ones and a filter), and what begins it."""
-    _, first = _with_courses(begin, engine, courses)
+    _, first = _with_courses(begin, engine, about_zero(courses))
     effects = {cause: effect for cause, effect in effects.items()
                if cause in first.search.candidates}
     if not effects:

@@ -231,6 +231,17 @@ def refined(engine, effects):
     return result
 
 
+def about_zero(courses):
+    """Courses of which such as are added lack a mean that is larger than all that they change by:
+    that is a constant, which has its own name."""
+    def moved(effect):
+        values = _values(effect)
+        mean = values.mean() if _adds(type(effect)) else 0.0
+        return effect if abs(mean) <= np.ptp(values) \
+            else effect.in_course(np.array(effect.course_at_s), values - mean)
+    return {cause: moved(effect) for cause, effect in courses.items()}
+
+
 def _to_be_described(p, kept, cls):
     """What a simulation with some effects leaves to a course, and its output where that acts."""
     return ((p.measured - p.simulate(kept)) * p.used,

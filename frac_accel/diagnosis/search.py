@@ -27,6 +27,8 @@ _MOST = 4
 # A third cause that takes away less of what is left, and leaves more than noise, ends the search:
 # causes are being added up to imitate one that is not known.
 _STUCK = 0.2
+# Share of the power that the model in use leaves below which what is left is little.
+_HARDLY = 1e-3
 # Iterations of a first trial, the cost over the best one's with which it ends there, and that with
 # which it goes on only as long as each iteration halves it.
 _TRIAL = 4
@@ -568,6 +570,10 @@ class Search:
             beam = self._that_differ([fit for fit in fits[:_BEAM]
                                       if fit.cost <= _HOPELESS * best.cost])
             if added >= 2 and gained < _STUCK and not done(best):
+                break
+            if best.cost < _HARDLY * self.baseline.cost and self.problem.limit.ends_growing(
+                    f"what makes less than {_HARDLY:.1%} of the power that the model in use leaves "
+                    "was not looked for"):
                 break
         return best
 

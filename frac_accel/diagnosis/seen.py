@@ -73,9 +73,9 @@ class Seen:
         """Share of the sensor's samples that say what the one before says, of those between whose
         neighbours the signal moves on, by more than its lattice; without those that its lattice
         makes the same, about as many as it lets be a step higher, or lower."""
-        values = self.record.topics[1].values[:, self.axis] if self.record.topics \
-            else self.measured
-        step = self.found.step or 0.0
+        topic = self.record.topics[1] if self.record.topics else None
+        values = topic.values[:, self.axis] if topic else self.measured
+        step = (topic.step(self.axis) if topic else self.found.step) or 0.0
         across = np.abs(values[2:] - values[:-2])
         moves = across > max(_MOVES_ON * step, float(np.median(across)))
         if not moves.any():

@@ -9,6 +9,8 @@ from ..simulation.compiling import compiled_s
 # Share of the budget after which nothing new is tried, so that what is known can be judged; and in
 # a part of a long record, the whole of which has to be fitted, too.
 _SEARCH, _SEARCH_IN_PART = 0.6, 0.4
+# The same after which a set that leaves little grows no more: its names matter more than the rest.
+_GROWING = 0.2
 # The same for the rivals of what was found, without which nothing has a name.
 _RIVALS, _RIVALS_IN_PART = 0.85, 0.65
 
@@ -42,6 +44,10 @@ class TimeLimit:
     def spent_s(self):
         """Processor time [s] since the start."""
         return time.process_time() - compiled_s() - self._start
+
+    def ends_growing(self, words=None):
+        """Whether a set that leaves little must not grow any more; notes what is left out."""
+        return self._over(_GROWING, words)
 
     def ends_search(self, words=None):
         """Whether the search must end; notes what is left out because of it."""

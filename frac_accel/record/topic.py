@@ -174,6 +174,11 @@ class Topic:
             1 + int(np.count_nonzero(np.diff(slot)))
         return int(slot[-1] - slot[0] + 1 - here)
 
+    @property
+    def places_missing(self):
+        """Number of places at which instants have no sample."""
+        return int(np.count_nonzero(np.diff(self.clock.slot) > 1))
+
     def step(self, column):
         """Step of the lattice that one axis' values lie on, or None."""
         return self._once("step", column, lambda: lattice_step(self.values[:, column]))

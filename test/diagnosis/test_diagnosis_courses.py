@@ -173,3 +173,18 @@ def test_a_course_is_not_sought_where_the_motion_beside_it_has_no_bound():
     _, engine, best = searched(draw_case(0, ["offset_drift"]), time_limit_s=10)
     with mock.patch.object(engine.problem, "simulate", side_effect=FracAccelError("no bound")):
         assert course_of(engine, best) == {}
+
+
+def test_a_zero_that_wanders_about_a_constant_has_both_names():
+    """All of it was the drift's, whose course began and ended far from none."""
+    rng = np.random.default_rng(66)
+    constant = rng.uniform(0.3, 0.6)
+
+    def sensor(rng, motion, rate):
+        place = np.linspace(0, 1, len(motion))
+        return motion - constant + 0.02 * np.cos(5 * np.pi * place) + 0.015 * np.cos(
+            3 * np.pi * place)
+    found = diagnose(pair([66, 1], sensor), SensorModel(Gain(1.0)))
+    findings = {finding.cause: finding for finding in found.findings}
+    assert findings.keys() == {"offset", "offset_drift"}
+    assert findings["offset"].effect.offset == pytest.approx(-constant, abs=0.005)

@@ -10,7 +10,7 @@ from frac_accel.model.core import Gain
 RATE, COUNT, NOISE = 400.0, 10_000, 0.003
 
 
-def polled(rng, response, reference_hz=RATE):
+def polled(rng, response, reference_hz=RATE, interval_s=None):
     """Values [(n,), (m,)] of reference and sensor at stamps [s]: a sum of sines, exact at any
     instant, behind a `response` (of frequencies [Hz]), sampled every so often and read at the
     stamps; these; and the interval [s]."""
@@ -18,7 +18,7 @@ def polled(rng, response, reference_hz=RATE):
     lines = (rng.normal(size=120) + 1j * rng.normal(size=120)) / np.sqrt(120)
     stamps = np.arange(COUNT) / RATE
     others = np.arange(COUNT * reference_hz // RATE) / reference_hz
-    interval_s = rng.uniform(1.4e-3, 2.7e-3)
+    interval_s = interval_s or rng.uniform(1.4e-3, 2.7e-3)
     taken = stamps - (stamps + rng.uniform(0, interval_s)) % interval_s
 
     def at(instants, lines):
@@ -43,6 +43,21 @@ def test_polled_values_are_explained(seed):
     left = pair[1] - np.interp(np.arange(COUNT) / RATE - interval_s / 2,
                                np.arange(COUNT) / RATE, pair[0])
     assert found.extended["rmse"] == pytest.approx(np.std(left), rel=0.2)
+
+
+@pytest.mark.parametrize("readings", [1, 2])
+@pytest.mark.parametrize("seed", range(2))
+def test_clocks_of_almost_the_same_rate_beat_slowly(seed, readings):
+    """Two clocks of 400 Hz: a sample is lost, or comes twice, every other second."""
+    rng = np.random.default_rng([64, seed])
+    beat_hz = rng.uniform(0.7, 1.5)
+    interval_s = 1 / (readings * RATE + rng.choice([-1, 1]) * beat_hz)
+    pair, _, _ = polled(rng, np.ones_like, interval_s=interval_s)
+    found = diagnose(pair, SensorModel(Gain(1.0)), sampling_rate_hz=RATE, time_limit_s=100)
+    finding, = found.findings
+    assert finding.cause == "polled_readout"
+    assert finding.effect.interval_s == pytest.approx(interval_s, rel=1e-5)
+    assert finding.effect.beat_hz == pytest.approx(beat_hz, rel=1e-3)
 
 
 @pytest.mark.parametrize("seed", range(3))

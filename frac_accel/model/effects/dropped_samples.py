@@ -11,6 +11,8 @@ from .base import STAMPS, Effect, Reading
 # Samples of which fewer may seem to be missing where stamps scatter by more than such a share of
 # the sampling interval (RMS).
 _SEVERAL, _SCATTER = 9, 0.1
+# Places at which some are missing: fewer are interruptions, which the data's words tell.
+_PLACES = 6
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,9 +54,10 @@ class DroppedSamples(Effect):
 
     def reading(self, seen):
         """Beside a simulation whose samples are counted as if none were lost; None of so few among
-        instants that scatter that chance may do it."""
-        if seen.found.missing < _SEVERAL \
-                and seen.found.jitter_rms_s * seen.record.sampling_rate_hz > _SCATTER:
+        instants that scatter that chance may do it, and at few places."""
+        scatters = seen.found.jitter_rms_s * seen.record.sampling_rate_hz > _SCATTER
+        if seen.found.missing < _SEVERAL and scatters \
+                or not self.at_s and seen.record.topics[1].places_missing < _PLACES:
             return None
         share, whole = self.fraction, seen.found.samples + seen.found.missing
         std = {"fraction": float(np.sqrt(share * (1 - share) / whole))}

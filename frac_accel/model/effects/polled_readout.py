@@ -12,11 +12,14 @@ from .steady_beat import STEADY, Start, SteadyBeat
 
 # Scatter of the stamps, in sampling intervals, from which an age is none.
 _SCATTERED = 0.01
-# Longest segment [samples] in which the beat's frequency must hold, and how many there must be.
-_SEGMENT, _SEGMENTS = 1024, 4
+# Segments [samples] in which the beat's frequency must hold, longer ones for slower beats, and how
+# many there must be.
+_LENGTHS, _SEGMENTS = (1024, 4096, 16384), 4
+# Share of the error that a beat in longer segments must make, over that of one in shorter ones.
+_CLEARER = 1.1
 # Lines of such a segment that are near another one, and next to none and to the Nyquist frequency,
 # where a lag is a slow one.
-_NEAR_LINES, _SLOW_LINES = 20, 8
+_NEAR_LINES, _SLOW_LINES = 20, 4
 # Power of the beat's line over the median of all, and of those up to twice where the slope has this
 # share of its power: beyond, most are empty. What is in the motion makes lines of its own: shares
 # that the slope or its square may have there of all its power, or else of that near it.
@@ -122,10 +125,20 @@ class Beat(NamedTuple):
     @classmethod
     def of(cls, measured, output, used):
         """The beat in what a simulation leaves, or None; arrays of shape (n,)."""
+        sizes = dict.fromkeys(min(length, len(output) // _SEGMENTS) for length in _LENGTHS)
+        best = None
+        for size in sizes:
+            found = cls._in_segments(measured, output, used, size) \
+                if size >= 16 * _SLOW_LINES else None
+            # in longer segments a phase that wanders looks steadier than it is
+            if found and (best is None or found.share > _CLEARER * best.share):
+                best = found
+        return best
+
+    @classmethod
+    def _in_segments(cls, measured, output, used, size):
+        """The same of a beat whose frequency holds in segments of so many samples."""
         error = measured - output
-        size = min(_SEGMENT, len(error) // _SEGMENTS)
-        if size < 8 * _SLOW_LINES:
-            return None
         slope = slope_of(output) * used
         level = (output - output[used].mean()) * used
         total = float(np.sum((error * used)**2))
