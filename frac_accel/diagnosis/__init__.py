@@ -79,6 +79,8 @@ _IDENTIFIED_AGAIN = 2
 # Times that all else is looked for without what is known of each sample, and the shares of what is
 # left (RMS) that this must be, and by which it must differ from what was known before.
 _KNOWN_AGAIN, _KNOWN, _KNOWN_BETTER = 6, 0.7, 0.05
+# Share of the power that common causes leave which a filter may leave for its response to be known.
+_MOST_LEFT = 0.2
 # Parameters of a classical core.
 _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 
@@ -156,10 +158,10 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     found.words.extend([*notes, *more])
     used = record.valid & moving
     found = _with_limits(found, record, column, used)
-    noise = reference_noise(record, column, used, _stated_noise(source[0], column),
-                            model and model.axis(axis).transfer_function)
-    if noise and noise.bends:
-        found = dataclasses.replace(found, reference_noise=noise, words=[*found.words, noise.words])
+    noise_by = functools.partial(reference_noise, record, column, used,
+                                 _stated_noise(source[0], column))
+    noise = noise_by(model and model.axis(axis).transfer_function)
+    found = _with_noise(found, noise)
     shown, used, stray, at_limit = _shown(found, record, column, used)
     poor = _too_poor(record, column, used, model)
     if poor:
@@ -193,6 +195,12 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
                              if effect.everyday}
         return begin, engine
     begin, engine = ready(model, stds, seed)
+    if noise is None:
+        noise = _noise_behind_a_filter(engine, noise_by)
+        if noise:
+            found = _with_noise(found, noise)
+            shown = {**_shown(found, record, column, used)[0], **shown}
+            begin, engine = ready(model, stds, seed)
 
     def identified_without(slips):
         whole = Record.of(source[0], put_back(source[1], slips), axis, temperature)
@@ -615,6 +623,23 @@ def _beside(begin, engine, hidden=np.False_):
     other.spikes, other.aside = engine.spikes, engine.aside
     other.search.courses, other.as_the_sensor = engine.search.courses, engine.as_the_sensor
     return other
+
+
+def _with_noise(found, noise):
+    """`Integrity` with the reference's noise, where that is enough to bend a fit."""
+    if noise is None or not noise.bends:
+        return found
+    return dataclasses.replace(found, reference_noise=noise, words=[*found.words, noise.words])
+
+
+def _noise_behind_a_filter(engine, noise_by):
+    """`ReferenceNoise` that shows beside a filter which the model in use lacks and which takes most
+    of what is left, by a function of a response; or None."""
+    common = engine.everyday()
+    fits = engine.search.with_a_filter(common, 1)
+    if not fits or fits[0].cost > _MOST_LEFT * common.cost:
+        return None
+    return noise_by(engine.problem.axis_model(fits[0].effects).transfer_function)
 
 
 def _shown(found, record, column, used):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import butter, lfilter, sosfiltfilt
+from scipy.signal import butter, iirpeak, lfilter, sosfilt, sosfiltfilt
 
 from frac_accel import FracAccelError, Samples, SensorModel, diagnose
 from frac_accel.model.core import Gain
@@ -139,3 +139,27 @@ def test_beside_a_filter_of_no_kind_a_high_pass_makes_no_late_reference():
             named += 1
             assert finding.effect.corner_hz == pytest.approx(corner, rel=0.05)
     assert named >= 2
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_noise_of_the_reference_shows_behind_a_high_pass(seed):
+    """Without it the two share too little of slow motion, and the search took all of its time."""
+    rng, rate, begins = np.random.default_rng([81, seed]), 200.0, 2_000
+    white = rng.standard_normal(24_000 + begins)
+    motion = sosfilt(butter(2, [1, 60], "bandpass", fs=rate, output="sos"), white)
+    for mode_hz in rng.uniform([4, 12, 30], [8, 20, 50]):
+        motion = motion + rng.uniform(1, 3) * lfilter(*iirpeak(mode_hz, rng.uniform(4, 10),
+                                                               fs=rate), white)
+    motion /= motion.std()
+    corner_hz = rng.uniform(1.5, 5)
+    sensor = sosfilt(butter(1, corner_hz, "high", fs=rate, output="sos"), motion)
+    std = rng.uniform(0.04, 0.08)
+    reference = motion + std * rng.standard_normal(len(motion))
+    sensor += 0.005 * rng.standard_normal(len(motion))
+    found = diagnose((reference[begins:], sensor[begins:]), SensorModel(Gain(1.0)),
+                     sampling_rate_hz=rate, time_limit_s=60)
+    named = {finding.cause: finding for finding in found.findings}
+    assert named.keys() == {"ac_coupling", "reference_noise"} and found.cut_off is None
+    corner = named["ac_coupling"]
+    assert abs(corner.effect.corner_hz - corner_hz) < 4 * corner.std["corner_hz"]
+    assert named["reference_noise"].effect.std == pytest.approx(std, rel=0.05)
