@@ -643,7 +643,8 @@ def _one_filter(engine, best):
     """Filters of the sensor that may be parts of one of higher order, which no cause says."""
     poles = {cause: np.atleast_1d(effect.poles()) for cause, effect in
              _filters(engine, best).items()
-             if is_link(effect) and not effect.of_reference and not effect.pure_delay_s()}
+             if is_link(effect) and not effect.of_reference and not effect.pure_delay_s()
+             and not follows_path(effect)}
     # what keeps the motion's constant is no low-pass
     poles = {cause: own for cause, own in poles.items()
              if len(own) and abs(best.effects[cause].transfer_function(np.array([0j]))[0]) > 0}
