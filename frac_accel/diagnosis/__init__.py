@@ -22,7 +22,7 @@ from ..model.effects.base import INTERFERENCE
 from ..record import Record
 from ..record.clipping import at_limits
 from ..record.orientation import Orientation, turned_away
-from ..record.sources import pair_of
+from ..record.sources import pair_of, temperature_of
 from ..simulation import AxisSimulator
 from .courses import about_zero, begun_with, beside, course_of, is_a_law, is_worth_it, refined
 from .doubts import undone_mounts
@@ -102,7 +102,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         The model in use; without it a classical one is identified first.
     axis : {"x", "y", "z"}
     temperature : tuple of ndarray, optional
-        Stamps [ns] and temperatures [°C].
+        Stamps [ns] and temperatures [°C]; by default, of a bag, those of its temperature topic.
     reference, sensor : str
         Topics, where `source` is a bag.
     progress : callable, optional
@@ -139,6 +139,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         raise FracAccelError(f"noise_std: {noise_std} given, expected a number above 0")
     limit = TimeLimit(time_limit_s)
     stages = Stages(progress, limit)
+    temperature = temperature or temperature_of(source)
     source = pair_of(source, sampling_rate_hz, axis, reference, sensor)
     column = AXES.index(axis)
     stages.enter("checking the data", CHECKED)

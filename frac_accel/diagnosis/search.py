@@ -27,6 +27,8 @@ _MOST = 4
 # A third cause that takes away less of what is left, and leaves more than noise, ends the search:
 # causes are being added up to imitate one that is not known.
 _STUCK = 0.2
+# Causes that are left out together, at least, where all of them may be none.
+_TOGETHER = 2
 # Share of the power that the model in use leaves below which what is left is little.
 _HARDLY = 1e-3
 # Iterations of a first trial, the cost over the best one's with which it ends there, and that with
@@ -602,6 +604,8 @@ class Search:
 
     def prune(self, best, threshold):
         """Leave out causes without which the record is described as well."""
+        if is_nonlinear(best):
+            best = self._of_needed(best, best.cost + threshold(best))
         while True:
             goal = best.cost + threshold(best)
             smaller = [self.without(best, cause, goal) for cause in best.effects
@@ -610,6 +614,17 @@ class Search:
             if not smaller:
                 return best
             best = min(smaller, key=lambda fit: fit.cost)
+
+    def _of_needed(self, best, goal):
+        """A fit of what is beyond doubt needed, where all others together are not: to leave them
+        out one by one takes as many fits of a motion that is simulated step by step as there are
+        pairs; else the fit as it is."""
+        less = {cause: effect for cause, effect in best.effects.items() if cause in self.base
+                or effect.restates_core or self._is_needed(best, cause, goal)}
+        if len(less) > len(best.effects) - _TOGETHER:
+            return best
+        found = next(iter(self.fit_all([less], best.cost, goal, needed=True)), None)
+        return found if found and found.cost < goal else best
 
     def _is_needed(self, best, cause, goal):
         """Whether what is left without a cause, all others moved to first order, is beyond doubt

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FracAccelError
+from ..errors import BagError, FracAccelError
 from ..io.samples import Samples
 from ..model import AXES
 
@@ -15,6 +15,18 @@ from ..model import AXES
 def is_bag(source: Any) -> bool:
     """Whether a source is the path of a bag."""
     return isinstance(source, (str, os.PathLike))
+
+
+def temperature_of(source: Any) -> tuple | None:
+    """Stamps [ns] and temperatures [°C] of a bag's own topic; None without, or of no bag."""
+    from ..io.bag import read_temperature
+    if not is_bag(source):
+        return None
+    try:
+        measured = read_temperature(source)
+    except BagError:
+        return None  # what is wrong with the bag, its other topics tell
+    return measured.stamps_ns, measured.celsius
 
 
 def samples_of(values: Any, sampling_rate_hz: float | None = None, axis: str = "x",

@@ -5,7 +5,8 @@ import pytest
 from sampled_pair import sampled_pair
 from scipy.signal import butter, lfilter, sosfilt, sosfiltfilt
 
-from frac_accel import diagnose
+from frac_accel import diagnose, write_bag
+from frac_accel.io.bag import Temperatures
 from frac_accel.model import SensorModel
 from frac_accel.model.core import Gain
 
@@ -42,6 +43,21 @@ def test_a_zero_that_follows_temperature_beside_noise_that_grows_with_the_motion
     value, std = found["thermal_offset"].effect.coefficient_per_k, \
         found["thermal_offset"].std["coefficient_per_k"]
     assert abs(value - per_k) < 4 * std < 0.1 * per_k
+
+
+def test_the_temperature_of_a_bag_is_its_own(tmp_path):
+    """The command read it, the function did not: `offset_drift` was named."""
+    rng = np.random.default_rng([51, 3])
+    motion = motion_of(rng)
+    seconds = np.arange(COUNT / RATE)
+    celsius = 25 + 6 * np.sin(2 * np.pi * seconds / rng.uniform(25, 40))
+    zero = 0.04 * np.interp(np.arange(len(motion)) / (FINER * RATE), seconds, celsius - 25)
+    reference, sensor = sampled_pair(rng, (motion, motion + zero), FINER, RATE, 1e-3)
+    stamps = sensor.stamps_ns[0] + np.round(1e9 * seconds).astype(np.int64)
+    bag = tmp_path / "bag.mcap"
+    write_bag(bag, {"/imu/reference": reference, "/imu/data_raw": sensor, "/imu/temperature":
+                    Temperatures(stamps, celsius, np.zeros(len(celsius)), "imu_link")})
+    assert named(bag).keys() == {"thermal_offset"}
 
 
 @pytest.mark.parametrize("seed", range(3))

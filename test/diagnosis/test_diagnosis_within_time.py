@@ -1,10 +1,15 @@
 """What a search does with the time that it has: what joins, what is left out, and whose rivals."""
 
+from unittest import mock
+
 import numpy as np
 import pytest
 import scipy.signal as sig
+from rig.hidden import draw_case
+from searched import searched as of_case
 
 import frac_accel
+from frac_accel.diagnosis import search as search_module
 from frac_accel.diagnosis.engine import Engine
 from frac_accel.diagnosis.problem import Problem
 from frac_accel.diagnosis.search import Search
@@ -161,3 +166,30 @@ def test_a_filter_that_joins_a_delay_begins_no_later_than_both(seed):
     assert filters
     for cause in filters:
         assert search.problem.cost(begun[cause]) < 1.2 * delayed.cost
+
+
+@pytest.mark.parametrize("spent", [0.25, 0.1])
+def test_a_set_that_leaves_little_grows_no_more_once_its_share_of_the_time_is_used_up(spent):
+    """What the noise's colour lets in as steps and tones took the time in which names are made."""
+    limit = Clock(100.0 * spent)
+    search = searched(1, limit)
+    with mock.patch.object(search_module, "_HARDLY", 1.0):
+        grown = search.grow([{}], lambda fit: 0.0, lambda *_: True, lambda fit: False, 2)
+    assert len(grown.causes) == (1 if spent > 0.2 else 2)
+    assert ("was not looked for" in str(limit.summary())) == (spent > 0.2)
+
+
+@pytest.mark.thorough
+def test_what_is_not_needed_beside_a_force_is_left_out_at_once():
+    """One by one took as many fits as there are pairs, each simulated step by step."""
+    _, engine, best = of_case(draw_case(9_990_001, ["quadratic_damping", "offset_step"]))
+    search = engine.search
+    more = {"sensitivity_error": EFFECTS["sensitivity_error"](1.0001),
+            "time_delay": EFFECTS["time_delay"](1e-6), "offset": EFFECTS["offset"](1e-5),
+            "tone_interference": EFFECTS["tone_interference"](31.0, 1e-4, 0.3)}
+    wide = search.fit({**best.effects, **more})
+    search.fits = {wide.causes: wide}
+    with mock.patch.object(search.problem, "fit", wraps=search.problem.fit) as fitted:
+        pruned = search.prune(wide, engine.threshold)
+    assert pruned.causes == {"quadratic_damping", "offset_step"}
+    assert fitted.call_count < 4
