@@ -605,7 +605,7 @@ class Search:
     def prune(self, best, threshold):
         """Leave out causes without which the record is described as well."""
         if is_nonlinear(best):
-            best = self._of_needed(best, best.cost + threshold(best))
+            best = self._of_needed(best, threshold(best))
         while True:
             goal = best.cost + threshold(best)
             smaller = [self.without(best, cause, goal) for cause in best.effects
@@ -615,14 +615,16 @@ class Search:
                 return best
             best = min(smaller, key=lambda fit: fit.cost)
 
-    def _of_needed(self, best, goal):
-        """A fit of what is beyond doubt needed, where all others together are not: to leave them
-        out one by one takes as many fits of a motion that is simulated step by step as there are
-        pairs; else the fit as it is."""
+    def _of_needed(self, best, more):
+        """A fit of what is beyond doubt needed, where each of all the others is worth less than
+        this `more` of the cost: to leave them out one by one takes as many fits of a motion that
+        is simulated step by step as there are pairs; else the fit as it is."""
         less = {cause: effect for cause, effect in best.effects.items() if cause in self.base
-                or effect.restates_core or self._is_needed(best, cause, goal)}
-        if len(less) > len(best.effects) - _TOGETHER:
+                or effect.restates_core or self._is_needed(best, cause, best.cost + more)}
+        gone = len(best.effects) - len(less)
+        if gone < _TOGETHER:
             return best
+        goal = best.cost + gone * more
         found = next(iter(self.fit_all([less], best.cost, goal, needed=True)), None)
         return found if found and found.cost < goal else best
 
