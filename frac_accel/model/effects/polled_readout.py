@@ -17,9 +17,9 @@ _SCATTERED = 0.01
 _LENGTHS, _SEGMENTS = (1024, 4096, 16384), 4
 # Share of the error that a beat in longer segments must make, over that of one in shorter ones.
 _CLEARER = 1.1
-# Lines of such a segment that are near another one, and next to none and to the Nyquist frequency,
-# where a lag is a slow one.
-_NEAR_LINES, _SLOW_LINES = 20, 4
+# Lines of such a segment that are near another one; and, of the shortest and of longer ones, next
+# to none and to the Nyquist frequency, where a lag is a slow one.
+_NEAR_LINES, _SLOW_LINES = 20, (8, 4)
 # Power of the beat's line over the median of all, and of those up to twice where the slope has this
 # share of its power: beyond, most are empty. What is in the motion makes lines of its own: shares
 # that the slope or its square may have there of all its power, or else of that near it.
@@ -129,9 +129,10 @@ class Beat(NamedTuple):
         best = None
         for size in sizes:
             found = cls._in_segments(measured, output, used, size) \
-                if size >= 16 * _SLOW_LINES else None
+                if size >= 8 * _SLOW_LINES[0] else None
             # in longer segments a phase that wanders looks steadier than it is
-            if found and (best is None or found.share > _CLEARER * best.share):
+            if found and (best is None or found.share > best.share * (
+                    1.0 if found.own_rate and not best.own_rate else _CLEARER)):
                 best = found
         return best
 
@@ -199,10 +200,11 @@ def _line(shared, slope, size):
     """Line of a segment's spectrum where a lag beats that the motion does not have, or None."""
     powers = [np.mean(np.abs(np.fft.rfft(_segments(values, size)))**2, axis=0)
               for values in (shared, slope, slope**2)]
-    inner = slice(_SLOW_LINES, -_SLOW_LINES)
-    line = _SLOW_LINES + int(np.argmax(powers[0][inner]))
+    slow = _SLOW_LINES[size > _LENGTHS[0]]
+    inner = slice(slow, -slow)
+    line = slow + int(np.argmax(powers[0][inner]))
     ends = int(np.searchsorted(np.cumsum(powers[1]), _ALL * powers[1].sum()))
-    held = powers[0][_SLOW_LINES:max(2 * ends, line) + 1]
+    held = powers[0][slow:max(2 * ends, line) + 1]
     if powers[0][line] < _STANDS_OUT * max(np.median(powers[0][inner]), np.median(held)) \
             or any(_has_line(power, line) for power in powers[1:]):
         return None
