@@ -58,16 +58,13 @@ def add_arguments(parser):
 def run(arguments):
     """Do it."""
     from ..diagnosis import diagnose
-    from ..io.bag import read_temperature
     from ..model import SensorModel
+    from ..record.sources import temperature_of
     require_report(arguments.report)
     model = SensorModel.load(arguments.model) if arguments.model else None
     reader = open_bag(arguments.bag)
-    temperature = None
-    if arguments.temperature in reader.topics:
-        measured = read_temperature(arguments.bag, arguments.temperature)
-        temperature = measured.stamps_ns, measured.celsius
-    elif arguments.temperature != TEMPERATURE_TOPIC:
+    temperature = temperature_of(arguments.bag, arguments.temperature)
+    if temperature is None and arguments.temperature != TEMPERATURE_TOPIC:
         print(f"warning: {arguments.bag}: no topic {arguments.temperature}: what depends on "
               "temperature cannot be found", file=sys.stderr)
     with share_done() as show, naming(arguments.bag):

@@ -14,7 +14,7 @@ from ..errors import FracAccelError, IdentificationError
 from ..identification.checks.clipped import clipped_sensor
 from ..identification.checks.record_checks import moving_samples, unclipped_reference
 from ..identification.response.excitation import held_out_of, require_excitation
-from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC
+from ..io.bag import RAW_TOPIC, REFERENCE_TOPIC, TEMPERATURE_TOPIC
 from ..model import AXES, SensorModel
 from ..model.core import Gain, Oscillator
 from ..model.effects import known_effects
@@ -88,8 +88,9 @@ _CORE = ("natural_frequency_hz", "damping_ratio", "sensitivity")
 # a trial that overflows has lost
 @np.errstate(over="ignore", invalid="ignore")
 def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
-             temperature: tuple | None = None, reference: str = REFERENCE_TOPIC,
-             sensor: str = RAW_TOPIC, progress: Callable | None = None,
+             temperature: tuple | str | None = TEMPERATURE_TOPIC,
+             reference: str = REFERENCE_TOPIC, sensor: str = RAW_TOPIC,
+             progress: Callable | None = None,
              noise_std: float | None = None, time_limit_s: float = float("inf"),
              sampling_rate_hz: float | None = None, screening: bool = False) -> Diagnosis:
     """Find what a simulation gets wrong, and why.
@@ -101,8 +102,8 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
     model : SensorModel, optional
         The model in use; without it a classical one is identified first.
     axis : {"x", "y", "z"}
-    temperature : tuple of ndarray, optional
-        Stamps [ns] and temperatures [°C]; by default, of a bag, those of its temperature topic.
+    temperature : tuple of ndarray, or str, optional
+        Stamps [ns] and temperatures [°C]; or the topic that holds them, where `source` is a bag.
     reference, sensor : str
         Topics, where `source` is a bag.
     progress : callable, optional
@@ -139,7 +140,8 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         raise FracAccelError(f"noise_std: {noise_std} given, expected a number above 0")
     limit = TimeLimit(time_limit_s)
     stages = Stages(progress, limit)
-    temperature = temperature or temperature_of(source)
+    if isinstance(temperature, str):
+        temperature = temperature_of(source, temperature)
     source = pair_of(source, sampling_rate_hz, axis, reference, sensor)
     column = AXES.index(axis)
     stages.enter("checking the data", CHECKED)
@@ -200,7 +202,7 @@ def diagnose(source: Any, model: SensorModel | None = None, axis: str = "x",
         noise = _noise_behind_a_filter(engine, noise_by)
         if noise:
             found = _with_noise(found, noise)
-            shown = {**_shown(found, record, column, used)[0], **shown}
+            shown = _by_record(found, record.sensor[:, column])
             begin, engine = ready(model, stds, seed)
 
     def identified_without(slips):
@@ -647,14 +649,19 @@ def _shown(found, record, column, used):
     """Causes that the record shows by itself; the samples that count with these; its spikes; and
     those that say nothing of other causes."""
     measured = record.sensor[:, column]
-    effects = {cause: effect.of_record(found, measured)
-               for cause, effect in known_effects().items()}
-    effects = {cause: effect for cause, effect in effects.items() if effect is not None}
+    effects = _by_record(found, measured)
     stray = used & spikes(measured, record.reference[:, column], found.step)
     silent = np.zeros(len(used), bool)
     for effect in effects.values():
         silent |= record.instants_of(effect.spoiled, column)
     return effects, used & ~stray & ~silent, stray, silent
+
+
+def _by_record(found, measured):
+    """Causes that the record shows by itself, as effects by cause."""
+    effects = {cause: effect.of_record(found, measured)
+               for cause, effect in known_effects().items()}
+    return {cause: effect for cause, effect in effects.items() if effect is not None}
 
 
 def _too_poor(record, column, used, model):

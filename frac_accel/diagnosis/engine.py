@@ -61,8 +61,6 @@ _UNMOVED = 3.0
 # noise.
 _PART = 0.1
 _PART_AT_LEAST = 0.03
-# Share of what a reference's noise hides that a cause must take beside it, and a frequency [Hz].
-_GUESSED, _SOMEWHERE = 0.01, np.ones(1)
 # Shares that noise has, too: of bursts by heavy tails (0.13 of Student's t with three degrees of
 # freedom), and of slow ones where its density grows with one over the frequency (0.11 to 0.49).
 _HEAVY_TAILS, _LONG_MEMORY = 0.3, 0.5
@@ -163,23 +161,13 @@ class Engine:
         """Cost by which a further parameter must improve on a fit."""
         left = self.problem.count
         variance = fitted.cost / left
-        return max(_CHANCE * variance * self._peak(fitted), self.floor**2 * left,
-                   self._of_guesses(fitted))
-
-    def _of_guesses(self, fitted):
-        """Cost that further filters may gain as the motion is only guessed from a noisy reference,
-        by spectra that are estimates."""
-        if not any(effect.of_reference and effect.unknown_density(_SOMEWHERE).any()
-                   for effect in self.search.base.values()):
-            return 0.0
-        return _GUESSED * min(self.problem.count * self.problem.by_reference(fitted.effects),
-                              fitted.cost)
+        return max(_CHANCE * variance * self._peak(fitted),
+                   self.floor**2 * left)
 
     def promises(self, fitted, cost):
         """Whether a cost that a screening expects is worth a fit."""
         return fitted.cost - cost > max(_CHANCE * cost / self.problem.count,
-                                        self.floor**2 * self.problem.count,
-                                        self._of_guesses(fitted))
+                                        self.floor**2 * self.problem.count)
 
     def run(self, seed=None):
         """The smallest set of causes that describes the record; of a long one, its `part`.

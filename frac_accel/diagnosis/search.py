@@ -31,6 +31,9 @@ _STUCK = 0.2
 _TOGETHER = 2
 # Share of the power that the model in use leaves below which what is left is little.
 _HARDLY = 1e-3
+# Share of the power that a reference's noise hides below which a cause may only mend the guess of
+# the motion, by spectra that are estimates; and a frequency [Hz].
+_GUESSED, _SOMEWHERE = 0.01, np.ones(1)
 # Iterations of a first trial, the cost over the best one's with which it ends there, and that with
 # which it goes on only as long as each iteration halves it.
 _TRIAL = 4
@@ -568,7 +571,8 @@ class Search:
             fits = self.fit_all([self.begun(*joins) for _, *joins in chosen])
             if not fits or best.cost - fits[0].cost < threshold(fits[0]):
                 break
-            gained, best = 1 - fits[0].cost / best.cost, fits[0]
+            before, best = best.cost, fits[0]
+            gained = 1 - best.cost / before
             beam = self._that_differ([fit for fit in fits[:_BEAM]
                                       if fit.cost <= _HOPELESS * best.cost])
             if added >= 2 and gained < _STUCK and not done(best):
@@ -577,7 +581,20 @@ class Search:
                     f"what makes less than {_HARDLY:.1%} of the power that the model in use leaves "
                     "was not looked for"):
                 break
+            if before - best.cost < self._of_guesses(best) and self.problem.limit.ends_growing(
+                    f"what makes less than {_GUESSED:.0%} of what the reference's noise hides was "
+                    "not looked for"):
+                break
         return best
+
+    def _of_guesses(self, fitted):
+        """Cost that further filters may gain as the motion is only guessed from a noisy reference.
+        """
+        if not any(effect.of_reference and effect.unknown_density(_SOMEWHERE).any()
+                   for effect in self.base.values()):
+            return 0.0
+        return _GUESSED * min(self.problem.count * self.problem.by_reference(fitted.effects),
+                              fitted.cost)
 
     def _that_differ(self, fits):
         """Some fits, less those that say the same as one before them but for what mixes the axes:

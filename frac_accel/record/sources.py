@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BagError, FracAccelError
+from ..errors import FracAccelError
 from ..io.samples import Samples
 from ..model import AXES
 
@@ -17,15 +17,18 @@ def is_bag(source: Any) -> bool:
     return isinstance(source, (str, os.PathLike))
 
 
-def temperature_of(source: Any) -> tuple | None:
-    """Stamps [ns] and temperatures [°C] of a bag's own topic; None without, or of no bag."""
-    from ..io.bag import read_temperature
-    if not is_bag(source):
+def temperature_of(source: Any, topic: str) -> tuple | None:
+    """Stamps [ns] and temperatures [°C] of a bag's topic; None where it has none, or of no bag.
+
+    Raises
+    ------
+    BagError
+        If the bag or what it has of the topic cannot be read.
+    """
+    from ..io.bag import BagReader, read_temperature
+    if not is_bag(source) or topic not in BagReader(source).topics:
         return None
-    try:
-        measured = read_temperature(source)
-    except BagError:
-        return None  # what is wrong with the bag, its other topics tell
+    measured = read_temperature(source, topic)
     return measured.stamps_ns, measured.celsius
 
 

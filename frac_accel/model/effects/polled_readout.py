@@ -125,10 +125,11 @@ class Beat(NamedTuple):
     @classmethod
     def of(cls, measured, output, used):
         """The beat in what a simulation leaves, or None; arrays of shape (n,)."""
+        slope = slope_of(output) * used
         sizes = dict.fromkeys(min(length, len(output) // _SEGMENTS) for length in _LENGTHS)
         best = None
         for size in sizes:
-            found = cls._in_segments(measured, output, used, size) \
+            found = cls._in_segments(measured, output, used, slope, size) \
                 if size >= 8 * _SLOW_LINES[0] else None
             # in longer segments a phase that wanders looks steadier than it is
             if found and (best is None or found.share > best.share * (
@@ -137,10 +138,9 @@ class Beat(NamedTuple):
         return best
 
     @classmethod
-    def _in_segments(cls, measured, output, used, size):
+    def _in_segments(cls, measured, output, used, slope, size):
         """The same of a beat whose frequency holds in segments of so many samples."""
         error = measured - output
-        slope = slope_of(output) * used
         level = (output - output[used].mean()) * used
         total = float(np.sum((error * used)**2))
         error = _without_slow(error * used, slope, level, size)
