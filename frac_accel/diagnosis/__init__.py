@@ -25,7 +25,7 @@ from ..record.orientation import Orientation, turned_away
 from ..record.sources import pair_of, temperature_of
 from ..simulation import AxisSimulator
 from .courses import about_zero, begun_with, beside, course_of, is_a_law, is_worth_it, refined
-from .doubts import undone_mounts
+from .doubts.delays import undone_mounts
 from .engine import Engine
 from .event import event, start
 from .finding import Diagnosis, Finding, insufficient

@@ -8,7 +8,7 @@ import numpy as np
 from ..model import SensorModel, is_link
 from ..model.core import Gain, Oscillator
 from ..model.effects import Effect, fault_of_reference, known_effects
-from .doubts import own_delay_s
+from .doubts.links import own_delay_s
 from .engine import LONG, Engine
 from .gain import gain
 from .naming import as_open

@@ -13,14 +13,9 @@ from ..model.effects.base import OFFSET
 from ..model.parameters import fixed_values, parameter_fields
 from ..shown import listed
 from .courses import with_level
-from .doubts import (
-    by_what_is_left,
-    least_lead,
-    left_open,
-    resembles,
-    stands_in_its_band,
-    within_own_delay,
-)
+from .doubts import by_what_is_left, left_open
+from .doubts.delays import least_lead, within_own_delay
+from .doubts.imitations import resembles, stands_in_its_band
 from .engine import WEIGHS
 from .experiments import separating_experiment
 from .finding import Finding

@@ -12,7 +12,9 @@ from ..model.core import Oscillator
 from ..model.effects import fault_of_reference
 from ..model.effects.base import STAMPS
 from . import courses
-from .doubts import delay_of_unseen_core, left_open, most_is_left, own_delay_s
+from .doubts import left_open, most_is_left
+from .doubts.delays import delay_of_unseen_core
+from .doubts.links import own_delay_s
 from .empirical import fit_empirical_link
 from .empirical_map import fit_empirical_map
 from .engine import OF_MOTION

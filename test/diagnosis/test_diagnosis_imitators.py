@@ -7,7 +7,7 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import bilinear, butter, lfilter, sosfilt, sosfiltfilt
 
 from frac_accel import Samples, SensorModel, diagnose
-from frac_accel.diagnosis.doubts import _another_alone
+from frac_accel.diagnosis.doubts.imitations import another_alone
 from frac_accel.diagnosis.engine import Engine
 from frac_accel.model.core import Gain
 from frac_accel.model.effects import known_effects
@@ -34,7 +34,7 @@ def engine_of(sensor):
 def doubted(engine, resonance):
     both = engine.search.fit({effect.cause: effect for effect in (AVERAGES, resonance)})
     engine.search.fit({LOW_PASS.cause: LOW_PASS})
-    return set(_another_alone(engine, both))
+    return set(another_alone(engine, both))
 
 
 def test_two_filters_that_one_low_pass_stands_for_are_doubted():

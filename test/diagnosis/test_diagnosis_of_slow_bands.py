@@ -8,7 +8,7 @@ from scipy.signal import fftconvolve, firwin
 
 import frac_accel
 from frac_accel import SensorModel
-from frac_accel.diagnosis.doubts import _nothing_at_its_peak
+from frac_accel.diagnosis.doubts.peaks import nothing_at_its_peak
 from frac_accel.diagnosis.engine import Engine
 from frac_accel.model.core import Gain
 from frac_accel.model.effects import effect_of
@@ -84,4 +84,4 @@ def test_a_mode_explains_something_around_its_resonance(resonates):
     record = Record.of(*samples(motion, sensor + 0.002 * noise, RATE))
     engine = Engine(record, 0, SensorModel(Gain(1.0)), record.valid, {})
     fit = engine.search.fit({mode.cause: mode})
-    assert set(_nothing_at_its_peak(engine, fit)) == (set() if resonates else {mode.cause})
+    assert set(nothing_at_its_peak(engine, fit)) == (set() if resonates else {mode.cause})

@@ -16,7 +16,7 @@ from shaken import OVERSAMPLING, measured, shocks
 
 import frac_accel
 from frac_accel import SensorModel
-from frac_accel.diagnosis.doubts import _another_core, _corner_hz
+from frac_accel.diagnosis.doubts.out_of_sight import _another_core, _corner_hz
 from frac_accel.diagnosis.problem import Problem
 from frac_accel.io.samples import Samples
 from frac_accel.model.core import Gain, Oscillator

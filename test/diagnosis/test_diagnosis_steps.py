@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from searched import searched
 
 import frac_accel
-from frac_accel.diagnosis.doubts import _within_steps
+from frac_accel.diagnosis.doubts.forces import within_steps
 from frac_accel.diagnosis.engine import Engine
 from frac_accel.diagnosis.problem import WRONG_BY_STEPS, _step
 from frac_accel.model.effects import known_effects
@@ -129,7 +129,7 @@ def test_a_filter_is_not_named_for_what_the_integration_may_be_wrong_by():
     strong = engine.rms(added["cubic_stiffness"])
     for times, doubted in ((0.5, {"time_delay"}), (2.0, set())):
         takes = {"cubic_stiffness": strong, "time_delay": times * WRONG_BY_STEPS * strong}
-        assert _within_steps(engine, fit, takes, added).keys() == doubted
+        assert within_steps(engine, fit, takes, added).keys() == doubted
 
 
 @pytest.mark.long

@@ -7,7 +7,7 @@ import pytest
 import scipy.signal as sig
 
 from frac_accel import SensorModel, diagnose
-from frac_accel.diagnosis.doubts import _undoes_the_core, undone_mounts
+from frac_accel.diagnosis.doubts.delays import undoes_the_core, undone_mounts
 from frac_accel.diagnosis.engine import Engine
 from frac_accel.diagnosis.flat import own_resonance_instead
 from frac_accel.model.core import Gain, Oscillator
@@ -39,15 +39,15 @@ def test_a_mount_that_undoes_a_lag_of_the_core_is_in_doubt(seed):
     mount = EFFECTS["mounting_resonance"](corner, 0.5)
     engine, fit = engine_and_fit(corner, 0.999, mount)
     assert fit.cost < 1e-4 * np.sum(engine.problem.measured**2)  # it is the filter
-    words = _undoes_the_core(engine, fit)["mounting_resonance"]
+    words = undoes_the_core(engine, fit)["mounting_resonance"]
     assert words.startswith("its zero undoes a lag of")
     # what the sensor's maker states is there, whatever a mount does beside it
-    assert not _undoes_the_core(*engine_and_fit(corner, 0.999, mount, is_known=True))
+    assert not undoes_the_core(*engine_and_fit(corner, 0.999, mount, is_known=True))
 
 
 def test_a_lag_beside_a_resonance_undoes_nothing():
     engine, fit = engine_and_fit(800.0, 0.5, EFFECTS["low_pass_lag"](800.0))
-    assert not _undoes_the_core(engine, fit)
+    assert not undoes_the_core(engine, fit)
 
 
 @pytest.mark.thorough
