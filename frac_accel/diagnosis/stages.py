@@ -16,7 +16,7 @@ class Stages:
     """
 
     def __init__(self, progress, limit):
-        self._progress, self._limit = progress, limit
+        self._progress, self.limit = progress, limit
         self._words, self._start, self._end, self._share = "", 0.0, 0.0, 0.0
 
     def enter(self, words, end):
@@ -33,6 +33,6 @@ class Stages:
         if self._progress is None:
             return
         share = self._start + part * (self._end - self._start)
-        spent = min(self._limit.spent_s() / self._limit.seconds, 1.0)
+        spent = min(self.limit.spent_s() / self.limit.seconds, 1.0)
         self._share = max(self._share, share, spent)
         self._progress(self._words, self._share)
