@@ -60,9 +60,9 @@ test-ros:
 
 # What make test leaves out but for the further draws: the site, searches and Monte Carlos that take
 # long, and what make test runs of numerical tests once more with the oldest libraries, where a
-# Python has them. PART=1 to 6: a sixth of those that take long.
+# Python has them. PART=1 to 8: an eighth of those that take long.
 test-all: setup docs
-	$(python) $(numerical) -m "thorough and not long" $(if $(PART),--splits 6 --group $(PART) \
+	$(python) $(numerical) -m "thorough and not long" $(if $(PART),--splits 8 --group $(PART) \
 	    --splitting-algorithm least_duration)
 	@if $(find_oldest) >/dev/null; then $(MAKE) --no-print-directory test-oldest; else \
 	    echo "so the numerical suite was not run with numpy 1.26.4 and scipy 1.11.4"; fi

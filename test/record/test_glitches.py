@@ -115,7 +115,7 @@ def test_bursts_of_motion_that_a_spring_bends_are_motion(seed):
 
 
 @pytest.mark.parametrize("kind", [
-    "hold", pytest.param("zeros", marks=pytest.mark.long),
+    pytest.param("hold", marks=pytest.mark.thorough), pytest.param("zeros", marks=pytest.mark.long),
     pytest.param("noise", marks=pytest.mark.thorough)])
 def test_a_faulty_reference_gives_the_sensor_no_name(kind):
     """Bursts of interference were named, or noise of the reference."""
