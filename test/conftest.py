@@ -17,18 +17,18 @@ SLOW = """
 # Files of searches and Monte Carlos that take most of the time: `make test-all` runs them.
 THOROUGH = """
     blind_scoring budget command_fleet diagnosis_beside_noise diagnosis_between_gaps
-    diagnosis_companions diagnosis_courses diagnosis_high_pass diagnosis_in_bands diagnosis_laws
-    diagnosis_late_steps diagnosis_like_axes diagnosis_noise_with_memory diagnosis_of_its_kind
-    diagnosis_of_machines diagnosis_of_measured diagnosis_of_slow_bands diagnosis_of_structures
-    diagnosis_off_clock diagnosis_on_the_road diagnosis_one_filter diagnosis_out_of_sight
-    diagnosis_polled diagnosis_scattered_instants diagnosis_screening diagnosis_settled
-    diagnosis_slow_motion diagnosis_soft_mount diagnosis_sprung diagnosis_steps diagnosis_sticking
-    diagnosis_stretches diagnosis_strong_spring diagnosis_truthful diagnosis_turned
-    diagnosis_unbounded diagnosis_under_gravity diagnosis_unequal_rates domains_agree empirical_link
-    free_mass further_forces fuzz identify_general_equation keeper linear_causes long_records
-    monitoring_watch outputs paper_command paper_study pooling published_shock real_records
-    reference_faults reference_noise report_browser stepped_sine_points uncertain_motion
-    write_errors
+    diagnosis_companions diagnosis_courses diagnosis_high_pass diagnosis_in_bands
+    diagnosis_late_steps diagnosis_laws diagnosis_like_axes diagnosis_noise_with_memory
+    diagnosis_of_its_kind diagnosis_of_machines diagnosis_of_measured diagnosis_of_slow_bands
+    diagnosis_of_structures diagnosis_off_clock diagnosis_on_the_road diagnosis_one_filter
+    diagnosis_out_of_sight diagnosis_polled diagnosis_scattered_instants diagnosis_screening
+    diagnosis_settled diagnosis_slow_motion diagnosis_soft_mount diagnosis_sprung diagnosis_steps
+    diagnosis_sticking diagnosis_stretches diagnosis_strong_spring diagnosis_truthful
+    diagnosis_turned diagnosis_unbounded diagnosis_under_gravity diagnosis_unequal_rates
+    domains_agree empirical_link free_mass further_forces fuzz identify_general_equation keeper
+    linear_causes long_records monitoring_watch outputs paper_command paper_study pooling
+    published_shock real_records reference_faults reference_noise report_browser stepped_sine_points
+    uncertain_motion write_errors
 """.split()
 # Files whose tests draw many records or sensors: the first draw of each test counts as the file
 # does, and `make test-draws` runs the others.
@@ -46,12 +46,12 @@ MANY_DRAWS = """
 """.split()
 # Files in which the first seed of each kind counts as the file does.
 SEEDS = """
-    diagnosis_across diagnosis_beside_noise diagnosis_between_gaps diagnosis_companions
-    diagnosis_courses diagnosis_high_pass diagnosis_in_bands diagnosis_like_axes
-    diagnosis_of_bent_gains diagnosis_of_instruments diagnosis_of_its_kind diagnosis_of_joints
-    diagnosis_of_jumps diagnosis_of_machines diagnosis_of_slow_bands diagnosis_one_filter
-    diagnosis_out_of_sight diagnosis_polled diagnosis_scattered_instants diagnosis_settled
-    diagnosis_sprung diagnosis_sticking diagnosis_strong_spring diagnosis_turned
+    diagnosis_across diagnosis_averaged_reference diagnosis_beside_noise diagnosis_between_gaps
+    diagnosis_companions diagnosis_courses diagnosis_high_pass diagnosis_in_bands
+    diagnosis_like_axes diagnosis_of_bent_gains diagnosis_of_instruments diagnosis_of_its_kind
+    diagnosis_of_joints diagnosis_of_jumps diagnosis_of_machines diagnosis_of_slow_bands
+    diagnosis_one_filter diagnosis_out_of_sight diagnosis_polled diagnosis_scattered_instants
+    diagnosis_settled diagnosis_sprung diagnosis_sticking diagnosis_strong_spring diagnosis_turned
     diagnosis_under_gravity
 """.split()
 

@@ -16,8 +16,9 @@ from .read_off import read_off
 from .verdict import Likely, verdict_on
 from .words import gain_words
 
-# Times that another set is looked for in which no cause is doubtful.
-_AGAIN = 2
+# Times that another set is looked for in which no cause is doubtful, and times what a set leaves
+# (power) that such a one may not leave with causes that the other does without.
+_AGAIN, _FAR_WORSE = 2, 2.0
 # Doubtful causes that are left out one after the other before another set is looked for.
 _WEAKEST = 2
 # Margin, in variances of the noise, by which a cause must beat its nearest rival.
@@ -136,7 +137,7 @@ def _settled(engine, best, noise_std, known=None):
         there = _examined(engine, other, noise_std, known)
         # one that is doubtful, too, may lead to another that is not
         if not there.doubts.keys() - constants_of(there.best.effects):
-            if there.gains.keys() - here.gains.keys():
+            if there.gains.keys() - here.gains.keys() and not _is_far_behind(here, there):
                 here, dropped = there, {**dropped, **gone}
             break
         others.append((there, dict(gone)))
@@ -161,6 +162,14 @@ def _settled(engine, best, noise_std, known=None):
                     here = there
                     break
     return here, dropped
+
+
+def _is_far_behind(here, there):
+    """Whether a set in which nothing is doubtful leaves far more than another one, by odd causes
+    that the other does without: what they stand for is known to be something else."""
+    return there.best.cost > _FAR_WORSE * here.best.cost and any(
+        not there.best.effects[cause].everyday
+        for cause in there.gains.keys() - here.gains.keys())
 
 
 def _no_longer(engine, examined):

@@ -23,7 +23,7 @@ from .imitations import (
     one_filter,
 )
 from .of_motion import at_standstill, of_motion, other_axes
-from .out_of_sight import beyond_the_motion, out_of_sight
+from .out_of_sight import beyond_the_motion, out_of_sight, unseen_by_reference
 from .peaks import (
     at_the_edge,
     hardly_rings,
@@ -62,7 +62,8 @@ def doubts_about(engine, best, gains, stds, left, noise):
             _cancelled(engine, best, added), corrections(engine, best, takes),
             by_sign(engine, best, added), nothing_at_its_peak(engine, best),
             rings_otherwise(engine, best, takes, noise), may_be_the_sensor(engine, best),
-            undoes_the_core(engine, best), out_of_sight(engine, best), hardly_rings(engine, best),
+            undoes_the_core(engine, best), out_of_sight(engine, best),
+            unseen_by_reference(engine, best, takes), hardly_rings(engine, best),
             at_the_edge(engine, best), of_a_further_mode(engine, best),
             of_motion(engine, best, added), beyond_the_motion(engine, best),
             hardly_more(engine, best, left), within_steps(engine, best, takes, added),

@@ -161,6 +161,9 @@ def corrections(engine, best, takes):
     what that lacks. Delays and shifts of the core do so beside a filter, odd ones beside any."""
     filters, found = filters_of(engine, best), {}
     rest = engine.rms(best.residual)
+    # what settles does little where it is judged
+    takes = {cause: max(taken, engine.takes(best, cause))
+             if best.effects[cause].shows_with_time else taken for cause, taken in takes.items()}
     for among, small in (
             ({cause for cause in filters if cause in takes},
              lambda cause: filters[cause].pure_delay_s() or filters[cause].restates_core),

@@ -19,6 +19,9 @@ from .links import (
 # Share of the motion's power beyond whose frequencies none is seen, and times the highest of these
 # from which a resonance is out of sight.
 _ALL_MOTION, _OUT_OF_SIGHT = 0.9999, 1.2
+# Share of a motion's size below which a reference shows none of it, and of what a cause takes
+# (power) that lies there.
+_UNSHOWN, _THERE = 0.1, 0.9
 # Times the end of what is compared up to which an average's corner is looked for, and frequencies.
 _FAR_BEYOND, _CORNERS = 8.0, 2049
 # Times as low as the model in use has it that a core's resonance is another one's, which nothing
@@ -91,6 +94,30 @@ def out_of_sight(engine, best):
         if corner > edge:
             found[cause] = f"its corner, {corner:.3g} Hz, lies beyond what is compared " \
                            f"({edge:.3g} Hz): there many filters, and cores, do the same"
+    return found
+
+
+def unseen_by_reference(engine, best, takes):
+    """Causes that take what they do where the reference has next to nothing of the motion: there
+    the sensor shows what no model can know."""
+    p = engine.problem
+    frequency = np.fft.rfftfreq(len(p.used), 1 / p.rate)
+    unseen = np.zeros(len(frequency), bool)
+    for effect in best.effects.values():
+        unseen |= effect.shows(frequency) < _UNSHOWN
+    if not unseen.any():
+        return {}
+
+    def power(fit):
+        return np.abs(np.fft.rfft(fit.residual * p.used))**2
+    with_all, found = power(best), {}
+    for cause in takes:
+        if not np.all(best.effects[cause].shows(frequency) == 1):
+            continue
+        gained = power(engine.best_without(best, cause)) - with_all
+        if gained[unseen].sum() > _THERE * abs(gained.sum()):
+            found[cause] = "what it explains lies where the reference has next to nothing of the " \
+                           "motion"
     return found
 
 

@@ -459,6 +459,10 @@ class Effect:
         """Density [(m/s²)²/Hz] of what a reference's fault leaves unknown of the motion."""
         return np.zeros_like(frequency_hz)
 
+    def shows(self, frequency_hz):
+        """Share of a motion's size that the reference has recorded, where that is not all of it."""
+        return np.ones_like(frequency_hz)
+
     def poles(self):
         """Poles of the link [rad/s]."""
         return np.array([])

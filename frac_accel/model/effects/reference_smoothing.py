@@ -3,7 +3,9 @@
 import dataclasses
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
+from ...signals.stationary import mean_of_lines, stationary
 from ..parameters import parameter
 from .base import REFERENCE, Effect
 from .fit_starts import matching, of_orders
@@ -13,10 +15,13 @@ _MOST = 16
 # Share of a motion's size below which it is taken as lost: to undo more would raise noise only.
 _LOST = 0.1
 # Share of a motion's size of which nothing is seen in a reference's noise, lines at least that tell
-# this noise; and what is still turned back of a motion whose power, over some lines, is so many
-# times that of the noise.
-_NOTHING, _TELL = 2e-3, 32
-_LEAST, _LINES, _STANDS_OUT = 0.01, 9, 10.0
+# this noise, and the part of them that has no more (some may lie beyond the reference's band).
+_NOTHING, _TELL, _NO_MORE = 2e-3, 32, 0.5
+# Times this noise that the power of some lines may have by chance, and more the more it would be
+# raised; and so many times more from which on it is surely the motion's.
+_BY_CHANCE, _RAISED, _RAMP = 1.6, 0.01, 0.4
+# Share of a length by which the first starts are apart, and finer ones on either side.
+_APART, _FINE = 0.08, 32
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,9 +29,9 @@ class ReferenceSmoothing(Effect):
     r"""The reference is so many moving averages of one length, each centred on its stamp.
 
     :math:`\mathrm{sinc}(L f)^n` of the motion is recorded, without a delay: how late a reference
-    is besides, `reference_delay` tells. The record is divided by that; where less than a tenth was
-    left of a motion, it stays lost, but for what stands far out of the reference's noise there,
-    such as an engine's tone.
+    is besides, `reference_delay` tells. The record is divided by that; a motion of which nothing
+    stands out of the reference's noise stays lost, and where nothing tells that noise, one of which
+    less than a tenth was left.
     """
 
     cause = "reference_smoothing"
@@ -41,21 +46,31 @@ class ReferenceSmoothing(Effect):
     order: int = parameter("1", minimum=1, maximum=_MOST, whole=True)
 
     def change_base(self, values, sampling_rate_hz):
-        from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+        level, scale = values.mean(), float(np.std(values))
+        if not scale > 0:
+            return values
         room = int(np.ceil(self.order * self.length_s * sampling_rate_hz))
-        padded = np.pad(values, room, mode="edge")
-        length = next_fast_len(len(padded) + room, real=True)
-        frequency_hz = rfftfreq(length, 1 / sampling_rate_hz)
-        level = values.mean()
-        lines = rfft(padded - level, length)
-        kept = self._kept(frequency_hz)
-        turned_back = _turned_back(kept)
+        length = next_fast_len(len(values) + 3 * room, real=True)
+        kept = self._kept(rfftfreq(length, 1 / sampling_rate_hz))
         if np.sum(np.abs(kept) < _NOTHING) >= _TELL:
-            # without what the ends leave everywhere
-            power = np.abs(rfft((padded - level) * np.hanning(len(padded)), length))**2
-            there = _stands_out(power, kept)
-            turned_back[there] = 1 / kept[there]
-        return level + irfft(turned_back * lines, length)[room:room + len(values)]
+            return level + scale * self._best_guess((values - level) / scale, sampling_rate_hz)
+        padded = np.pad(values - level, room, mode="edge")
+        return level + irfft(_turned_back(kept) * rfft(padded, length),
+                             length)[room:room + len(values)]
+
+    def _best_guess(self, values, sampling_rate_hz):
+        """The motion by Wiener's filter: the lines of which nothing was left tell the noise."""
+        record = stationary(values)
+        kept = self._kept(rfftfreq(record.length, 1 / sampling_rate_hz))
+        noise = np.quantile(record.power[np.abs(kept) < _NOTHING], _NO_MORE)
+        # of the motion, by all lines around
+        chance = _BY_CHANCE + _RAISED / np.maximum(np.abs(kept), _NOTHING**2)
+        surely = np.clip((record.power / noise - chance) / _RAMP, 0.0, 1.0)
+        power = surely * (record.power - noise) / np.maximum(mean_of_lines(kept**2), _NOTHING**4)
+        return record.filtered(kept * power / (kept**2 * power + noise), _turned_back(kept))
+
+    def shows(self, frequency_hz):
+        return np.abs(self._kept(frequency_hz))
 
     def transfer_function(self, s):
         # of the frequency axis, as `change_base` does it: it has no phase that damping could bend
@@ -69,19 +84,14 @@ class ReferenceSmoothing(Effect):
 
     @classmethod
     def starts(cls, view):
-        return matching(view, [
+        near = matching(view, [
             cls(float(length), order) for length in np.geomspace(0.3, 100, 80) / view.rate
             for order in (1, 2, 4, 16)])
+        # a notch in the wrong place turns the sign of what is beside it: no fit comes from afar
+        return matching(view, [
+            dataclasses.replace(start.effect, length_s=start.effect.length_s * (1 + apart))
+            for start in near for apart in np.linspace(-_APART, _APART, 2 * _FINE + 1)])
 
 
 def _turned_back(kept):
     return kept / np.maximum(kept**2, _LOST**2)
-
-
-def _stands_out(power, kept):
-    """Which lines of a power spectrum show motion although little of it was left: they stand far
-    out of those where nothing was left."""
-    from scipy.ndimage import uniform_filter1d
-    noise = power[np.abs(kept) < _NOTHING].mean()
-    return (np.abs(kept) < _LOST) & (np.abs(kept) > _LEAST) \
-        & (uniform_filter1d(power, _LINES) > _STANDS_OUT * noise)
