@@ -137,25 +137,29 @@ class Engine:
     def held_out_rows(self):
         """Samples that count and are not learnt from, but judged on, as a mask.
 
-        Where the model in use errs before them, as beside a zero that has settled, every other
-        stretch: nothing could be judged by them. The same where it errs in them only, as behind a
-        step: nothing could be learnt before.
+        Where the model in use, by itself or with what is common, errs before them, as beside a zero
+        that has settled, every other stretch: nothing could be judged by them. The same where it
+        errs in them only, as behind a step: nothing could be learnt before.
         """
         p = self.problem
         reference = p.record.reference[:, p.axis]
         last = held_out_of(reference, p.used)
-        error = self.search.baseline.residual
-        length = max(len(error) // _SLOW_PARTS, 1)
-        slow = uniform_filter1d(error, length)
-        before, there = ([float(np.std(values[p.used & rows])) for values in (error, slow)]
+        if all(self._errs_in_both(fit.residual, last)
+               for fit in (self.search.baseline, self.everyday())):
+            return p.used & last
+        return p.used & alternating_stretches(reference, STRETCHES)
+
+    def _errs_in_both(self, error, last):
+        """Whether an error is about as large where a mask is set and where it is not."""
+        used = self.problem.used
+        slow = uniform_filter1d(error, max(len(error) // _SLOW_PARTS, 1))
+        before, there = ([float(np.std(values[used & rows])) for values in (error, slow)]
                          for rows in (~last, last))
 
         def errs(most, least, share):
             slowly = most[1] > _ERRS_SLOWLY * most[0]
             return least[0] > share * most[0] and (not slowly or least[1] > share * most[1])
-        if errs(before, there, _ERRS_THERE) and errs(there, before, _ERRS_BEFORE):
-            return p.used & last
-        return p.used & alternating_stretches(reference, STRETCHES)
+        return errs(before, there, _ERRS_THERE) and errs(there, before, _ERRS_BEFORE)
 
     def threshold(self, fitted):
         """Cost by which a further parameter must improve on a fit."""

@@ -7,7 +7,7 @@ import pytest
 from sampled_pair import sampled_pair
 from scipy.signal import butter, sosfiltfilt
 
-from frac_accel import SensorModel, diagnose
+from frac_accel import Samples, SensorModel, diagnose
 from frac_accel.diagnosis.doubts import left_open
 from frac_accel.diagnosis.naming import moved
 from frac_accel.diagnosis.verdict import _kept
@@ -47,6 +47,15 @@ def test_a_zero_that_has_settled_is_named(seed):
     assert abs(settled.effect.size + size) < 4 * settled.std["size"]
     assert abs(settled.effect.time_constant_s - constant_s) < 4 * settled.std["time_constant_s"]
     assert found.extended["nrmse"] < 0.01
+
+
+@pytest.mark.parametrize("seed", [6, 7])
+def test_it_is_named_beside_what_does_far_more_where_it_is_judged(seed):
+    """There it has settled: it might "mend what a delay lacks", it was said."""
+    (reference, sensor), *_ = settling(seed, (8.0, 14.0))
+    late = Samples.of(sensor.stamps_ns + 20_000_000, sensor.values)
+    found = diagnose((reference, late), SensorModel(Gain(1.0)), time_limit_s=60)
+    assert {finding.cause for finding in found.findings} == {"warm_up_drift", "time_delay"}
 
 
 @pytest.mark.parametrize("seed", [4, 5])
