@@ -13,6 +13,8 @@ _LEFT = 0.5
 _SURE = 3.0
 # Share of what a jump changes on one side of it (RMS) that it must change on the other one.
 _MOVES = 0.05
+# Times what is left there (RMS) from which the jump shows, whatever it changes on the other side.
+_SHOWS = 3.0
 # Blocks of the record from whose errors the uncertainty is taken.
 _BLOCKS = 40
 
@@ -35,9 +37,11 @@ def gradual(engine, fitted, causes):
         always = _if_always(p, fitted, unknown.cause, unknown.name)
         since_s = (p.record.since_start_s + p.time - at_s)[p.used]
         after = since_s >= 0
-        less, more = sorted(np.sqrt(np.mean(always[side]**2)) if side.any() else 0.0
-                            for side in (after, ~after))
-        if less < _MOVES * more:
+        moves = [_rms(always[side]) for side in (after, ~after)]
+        less, more = sorted(moves)
+        left = _rms(fitted.residual[p.used][after if moves[0] == less else ~after])
+        # one event on one side takes nothing from what the other shows
+        if less < min(_MOVES * more, _SHOWS * left):
             found[unknown.cause] = "the motion that would show it is on one side of it only: it " \
                                    f"changes {less:.3g} RMS on the other, {more:.3g} there"
             continue
@@ -47,6 +51,11 @@ def gradual(engine, fitted, causes):
                                    f"{max(left, 0.0):.0%} ± {std:.0%} of the jump are left: it " \
                                    "may be none"
     return found
+
+
+def _rms(values):
+    """RMS of values; 0 of none."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
 
 
 def _if_always(problem, fitted, cause, name):

@@ -366,9 +366,13 @@ class Problem:
 
     def joined(self, effects, cause, effect):
         """Change of the output, shape (n,), when a cause joins others, for a screening: to first
-        order, but for a force that holds the mass. Where that hardly moves otherwise, or turns
-        within few samples, a first order says nothing, and the force is simulated."""
-        if _holds(effect, self.axis_model(effects)):
+        order, but for a force that holds the mass, and what such a force makes of a gain or of
+        time. Where that hardly moves otherwise, or turns within few samples, a first order says
+        nothing, and the force is simulated."""
+        model = self.axis_model(effects)
+        if _holds(effect, model) or not (
+                is_link(effect) or effect.adds or acts_on_spring(effect)) and any(
+                _holds(other, model) for other in effects.values()):
             return self.simulate({**effects, cause: effect}, steps=_STEPS_OF_SLOPES) \
                 - self._remembered(effects, True, _STEPS_OF_SLOPES)
         return self.change(effects, cause, effect, not self._hardly_crossed(effects))

@@ -555,18 +555,20 @@ class Search:
             if self.problem.limit.ends_search(f"sets of more than {known} were not tried"):
                 break
             self.stages.enter_round(f"searching for cause {added + 1}", SEARCHED)
-            wanted = {}
+            wanted, unscreened = {}, []
             # beside noise only by what is clear whatever the spectrum of what would be left
             least = best.cost / (1 + threshold(best) / best.cost) if done(best) else np.inf
             for parent in sorted(beam, key=is_nonlinear):
                 promised = min((cost for cost, *_ in wanted.values()), default=np.inf)
                 if is_nonlinear(parent) and promised < _FAR_LESS * parent.cost:
-                    continue  # to screen beside a force or friction takes long
+                    unscreened.append(parent)  # beside a force or friction it takes long
+                    continue
                 for cost, cause, begin in self.screen(parent):
                     key = parent.causes | {cause}
                     if promises(parent, cost) and cost < least \
                             and (key not in wanted or cost < wanted[key][0]):
                         wanted[key] = cost, parent, cause, begin
+            wanted |= self._as_beside_others(unscreened, wanted)
             chosen = _varied_choice(sorted(wanted.values(), key=lambda entry: entry[0]), best.cost)
             fits = self.fit_all([self.begun(*joins) for _, *joins in chosen])
             if not fits or best.cost - fits[0].cost < threshold(fits[0]):
@@ -586,6 +588,17 @@ class Search:
                     "not looked for"):
                 break
         return best
+
+    def _as_beside_others(self, unscreened, wanted):
+        """What promises most beside other fits, for some that were not screened, as `wanted`."""
+        found = {}
+        for parent in unscreened:
+            cost, other, cause, begin = min(wanted.values(), key=lambda entry: entry[0])
+            key = parent.causes | {cause}
+            if cause not in parent.causes and key not in wanted:
+                self._starts[parent.causes, cause] = self._starts[other.causes, cause]
+                found[key] = cost, parent, cause, begin
+        return found
 
     def _of_guesses(self, fitted):
         """Cost that further filters may gain as the motion is only guessed from a noisy reference.

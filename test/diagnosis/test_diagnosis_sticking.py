@@ -4,7 +4,7 @@ from unittest import mock
 
 import numpy as np
 import pytest
-from rig.excitation import band_noise
+from rig.excitation import band_noise, noise_bursts
 from rig.record import simulate_record
 from rig.sensor import Sensor
 
@@ -34,6 +34,29 @@ def test_friction_beside_a_lag_in_slow_waves_is_named(seed):
     sizes = {f.cause: f.effect for f in found.findings}
     assert sizes["coulomb_friction"].level == pytest.approx(level, rel=0.02)
     assert sizes["low_pass_lag"].corner_hz == pytest.approx(corner_hz, rel=0.01)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_stamps_that_jump_show_beside_friction_that_mostly_holds(seed):
+    """One event, then quiet motion, which would show the jump on one side only, it was said; and
+    what a jump makes of the motion without friction is another."""
+    rng = np.random.default_rng([18, seed])
+    core = {**CORE, "natural_frequency_hz": rng.uniform(40, 50),
+            "damping_ratio": rng.uniform(0.3, 0.5)}
+    causes = {"coulomb_friction": {"level": rng.uniform(0.12, 0.16)}, "time_step": {
+        "at_s": rng.uniform(70.0, 90.0), "step_s": rng.uniform(0.01, 0.016)}}
+    levels = [0.2, rng.uniform(15, 25), 1.0] + [rng.uniform(0.18, 0.22) for _ in range(9)]
+    record = simulate_record(Sensor(core, causes), noise_bursts(
+        rng, 100.0, 160.0, (1.0, 30.0), levels), rng, snr_db=60.0)
+    found = diagnose((Samples.of(record.stamps_ns, record.reference),
+                      Samples.of(record.sensor_stamps_ns, record.sensor)),
+                     SensorModel.from_dict({"schema": "frac_accel/sensor_model/1", "core": core}),
+                     time_limit_s=60)
+    named = {f.cause: f.effect for f in found.findings}
+    assert named.keys() == causes.keys()
+    assert named["coulomb_friction"].level == pytest.approx(causes["coulomb_friction"]["level"],
+                                                            rel=0.02)
+    assert named["time_step"].step_s == pytest.approx(causes["time_step"]["step_s"], rel=0.02)
 
 
 @pytest.mark.parametrize("beta, words", [(0.0, "beta is compatible with 0"), (0.1, None)])
