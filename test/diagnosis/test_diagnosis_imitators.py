@@ -1,5 +1,7 @@
 """Two filters that imitate one which is simpler, and two that are there."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from sampled_pair import sampled_pair
@@ -9,6 +11,7 @@ from scipy.signal import bilinear, butter, lfilter, sosfilt, sosfiltfilt
 from frac_accel import Samples, SensorModel, diagnose
 from frac_accel.diagnosis.doubts.imitations import another_alone
 from frac_accel.diagnosis.engine import Engine
+from frac_accel.diagnosis.judgement import Examined, _is_far_behind
 from frac_accel.model.core import Gain
 from frac_accel.model.effects import known_effects
 from frac_accel.record import Record
@@ -69,3 +72,17 @@ def test_noise_of_the_reference_is_no_filter_where_stamps_scatter(seed):
         (stamps, noisy), (stamps + 3e5 * rng.normal(size=n) + 1e6,
                           motion + 0.05 * rng.normal(size=n)))), SensorModel(Gain(1.0)))
     assert found.findings == []
+
+
+@pytest.mark.parametrize("cost, name, expected", [
+    (1.9, "free_mass_friction", False), (2.1, "free_mass_friction", True),
+    (2.1, "sensitivity_error", False), (2.1, "second_resonance", False)])
+def test_a_set_without_doubts_that_leaves_far_more_is_no_answer(cost, name, expected):
+    """Dry friction was named for a slow temperature probe, of which other sets, all in doubt, left
+    a third of the power."""
+    def examined(cost, *causes):
+        effects = {cause: EFFECTS[cause] for cause in causes}
+        return Examined(SimpleNamespace(cost=cost, effects=effects), dict.fromkeys(causes), None,
+                        {}, {})
+    here = examined(1.0, "second_resonance", "time_delay")
+    assert _is_far_behind(here, examined(cost, name, "offset")) == expected
