@@ -3,9 +3,7 @@
 import dataclasses
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from ...signals.stationary import mean_of_lines, stationary
 from ..parameters import parameter
 from .base import REFERENCE, Effect
 from .fit_starts import matching, of_orders
@@ -46,6 +44,8 @@ class ReferenceSmoothing(Effect):
     order: int = parameter("1", minimum=1, maximum=_MOST, whole=True)
 
     def change_base(self, values, sampling_rate_hz):
+        # a node that corrects needs none of these
+        from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
         level, scale = values.mean(), float(np.std(values))
         if not scale > 0:
             return values
@@ -60,6 +60,9 @@ class ReferenceSmoothing(Effect):
 
     def _best_guess(self, values, sampling_rate_hz):
         """The motion by Wiener's filter: the lines of which nothing was left tell the noise."""
+        from scipy.fft import rfftfreq
+
+        from ...signals.stationary import mean_of_lines, stationary
         record = stationary(values)
         kept = self._kept(rfftfreq(record.length, 1 / sampling_rate_hz))
         noise = np.quantile(record.power[np.abs(kept) < _NOTHING], _NO_MORE)
