@@ -59,19 +59,16 @@ def run(arguments):
     """Do it."""
     from ..diagnosis import diagnose
     from ..model import SensorModel
-    from ..record.sources import temperature_of
     require_report(arguments.report)
     model = SensorModel.load(arguments.model) if arguments.model else None
     reader = open_bag(arguments.bag)
-    temperature = temperature_of(arguments.bag, arguments.temperature)
-    if temperature is None and arguments.temperature != TEMPERATURE_TOPIC:
+    if arguments.temperature not in (*reader.topics, TEMPERATURE_TOPIC):
         print(f"warning: {arguments.bag}: no topic {arguments.temperature}: what depends on "
               "temperature cannot be found", file=sys.stderr)
     with share_done() as show, naming(arguments.bag):
-        found = diagnose(arguments.bag, model, arguments.axis, temperature, arguments.reference,
-                         arguments.sensor, show,
-                         arguments.noise_std, arguments.time_limit,
-                         screening=arguments.screened)
+        found = diagnose(arguments.bag, model, arguments.axis, arguments.temperature,
+                         arguments.reference, arguments.sensor, show, arguments.noise_std,
+                         arguments.time_limit, screening=arguments.screened)
     print(table(found, arguments.axis))
     command = f"frac_accel diagnose {arguments.bag} --axis {arguments.axis}" + (
         f" --model {arguments.model}" if arguments.model else "")

@@ -165,8 +165,7 @@ class Engine:
         """Cost by which a further parameter must improve on a fit."""
         left = self.problem.count
         variance = fitted.cost / left
-        return max(_CHANCE * variance * self._peak(fitted),
-                   self.floor**2 * left)
+        return max(_CHANCE * variance * self._peak(fitted), self.floor**2 * left)
 
     def promises(self, fitted, cost):
         """Whether a cost that a screening expects is worth a fit."""

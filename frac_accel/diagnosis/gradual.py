@@ -36,16 +36,16 @@ def gradual(engine, fitted, causes):
         p, at_s = engine.problem, getattr(fitted.effects[unknown.cause], unknown.name)
         always = _if_always(p, fitted, unknown.cause, unknown.name)
         since_s = (p.record.since_start_s + p.time - at_s)[p.used]
-        after = since_s >= 0
-        moves = [_rms(always[side]) for side in (after, ~after)]
-        less, more = sorted(moves)
-        left = _rms(fitted.residual[p.used][after if moves[0] == less else ~after])
+        after, residual = since_s >= 0, fitted.residual[p.used]
+        (less, left_there), (more, _) = sorted(
+            ((_rms(always[side]), _rms(residual[side])) for side in (after, ~after)),
+            key=lambda entry: entry[0])
         # one event on one side takes nothing from what the other shows
-        if less < min(_MOVES * more, _SHOWS * left):
+        if less < min(_MOVES * more, _SHOWS * left_there):
             found[unknown.cause] = "the motion that would show it is on one side of it only: it " \
                                    f"changes {less:.3g} RMS on the other, {more:.3g} there"
             continue
-        left, std = _jump_left(fitted.residual[p.used], always, since_s)
+        left, std = _jump_left(residual, always, since_s)
         if left < max(_LEFT, _SURE * std):
             found[unknown.cause] = "beside a gradual change before and after it " \
                                    f"{max(left, 0.0):.0%} ± {std:.0%} of the jump are left: it " \

@@ -13,6 +13,7 @@ from .flat import flat_instead
 from .relation import related_in_fast_motion
 from .stretches import MOST, strongest_part
 
+# Samples below which nothing is said.
 FEWEST = 512
 # Coefficients of a classical core with its delay: what the excitation must at least be good for.
 _COEFFICIENTS = 4

@@ -23,8 +23,8 @@ _CLIPPED_REFERENCE = 0.02
 
 
 def with_motion(record, column):
-    """The record without what is known of no motion, since the reference is clipped; the instants
-    at which neither topic stands still alone; and words."""
+    """The record without the instants at which the reference is clipped; the others, less those at
+    which one topic stands still while the other moves; and words."""
     moving, notes = moving_samples(record, column)
     unclipped, more = unclipped_reference(record, column, moving, _CLIPPED_REFERENCE)
     # what moved there nobody knows: no budget parts it either

@@ -370,9 +370,9 @@ class Problem:
         time. Where that hardly moves otherwise, or turns within few samples, a first order says
         nothing, and the force is simulated."""
         model = self.axis_model(effects)
-        if _holds(effect, model) or not (
-                is_link(effect) or effect.adds or acts_on_spring(effect)) and any(
-                _holds(other, model) for other in effects.values()):
+        of_gain_or_time = not (is_link(effect) or effect.adds or acts_on_spring(effect))
+        if any(_holds(other, model)
+               for other in ([effect] if not of_gain_or_time else effects.values())):
             return self.simulate({**effects, cause: effect}, steps=_STEPS_OF_SLOPES) \
                 - self._remembered(effects, True, _STEPS_OF_SLOPES)
         return self.change(effects, cause, effect, not self._hardly_crossed(effects))

@@ -167,3 +167,4 @@ def test_noise_of_the_reference_shows_behind_a_high_pass(seed):
     assert abs(corner.effect.corner_hz - corner_hz) < 4 * corner.std["corner_hz"]
     noise = named["reference_noise"]
     assert abs(noise.effect.std - std) < 4 * noise.std["std"]
+    assert noise.effect.std == pytest.approx(std, rel=0.05)

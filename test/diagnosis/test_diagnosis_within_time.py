@@ -1,5 +1,6 @@
 """What a search does with the time that it has: what joins, what is left out, and whose rivals."""
 
+from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
@@ -193,3 +194,16 @@ def test_what_is_not_needed_beside_a_force_is_left_out_at_once():
         pruned = search.prune(wide, engine.threshold)
     assert pruned.causes == {"quadratic_damping", "offset_step"}
     assert fitted.call_count < 4
+
+
+def test_what_promises_most_is_tried_beside_what_is_not_screened():
+    """Beside a force a screening takes long; what it would begin with is known from other fits."""
+    linear, forced, has_it = (SimpleNamespace(causes=frozenset(causes)) for causes in (
+        {"offset"}, {"offset", "coulomb_friction"}, {"coulomb_friction", "time_step"}))
+    search = SimpleNamespace(_starts={(linear.causes, "time_step"): "its start"})
+    wanted = {frozenset({"offset", "time_step"}): (1.0, linear, "time_step", "begins so"),
+              frozenset({"offset", "gain_step"}): (2.0, linear, "gain_step", "or so")}
+    found = Search._as_beside_others(search, [forced, has_it], wanted)
+    assert found == {forced.causes | {"time_step"}: (1.0, forced, "time_step", "begins so")}
+    assert search._starts[forced.causes, "time_step"] == "its start"
+    assert Search._as_beside_others(search, [], {}) == {}

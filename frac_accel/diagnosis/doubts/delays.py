@@ -171,6 +171,7 @@ def undone_mounts(engine, best):
 
 
 def may_be_the_sensor(engine, best):
+    """Mounts whose zero the other filters undo."""
     return {cause: f"its zero leads by {lead_s:.3g} s, and the other filters lag by as much: the "
                    "sensor's own resonance does the same without either"
             for cause, lead_s in undone_mounts(engine, best).items()}

@@ -18,6 +18,7 @@ from .links import (
     is_smooth,
     lag_s_at,
     linear_share,
+    power_of,
     share_of,
 )
 from .peaks import stands_out_at_its_peak
@@ -110,8 +111,7 @@ def _without_phase(engine, best, filters):
 def stands_in_its_band(engine, fitted, cause):
     """Whether what a cause takes stands far out of all that is left at the frequencies at which it
     acts, whatever is left at others."""
-    used = engine.problem.used
-    change, left = (np.abs(np.fft.rfft(values * used))**2
+    change, left = (power_of(engine.problem, values)
                     for values in (engine.added(fitted, cause), fitted.residual))
     order = np.argsort(change)[::-1]
     acts = order[:1 + int(np.searchsorted(np.cumsum(change[order]), _ACTS * change.sum()))]

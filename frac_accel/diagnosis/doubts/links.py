@@ -44,7 +44,7 @@ def linear_share(engine, fitted):
 def highest_hz(engine, best, share=_MOTION):
     """Frequency [Hz] below which nearly all of the motion is that the sensor shows."""
     used = engine.problem.used
-    energy = np.cumsum(np.abs(np.fft.rfft((best.output - best.output[used].mean()) * used))**2)
+    energy = np.cumsum(power_of(engine.problem, best.output - best.output[used].mean()))
     return np.searchsorted(energy, share * energy[-1]) * engine.problem.rate / len(used)
 
 
@@ -53,12 +53,17 @@ def highest_seen_hz(engine, best):
     p = engine.problem
 
     def density(values):
-        power = np.abs(np.fft.rfft((values - values[p.used].mean()) * p.used))**2
+        power = power_of(p, values - values[p.used].mean())
         return uniform_filter1d(power, max(len(power) // _BANDS, 1), mode="reflect")
     left, frequency = density(best.residual), np.fft.rfftfreq(len(p.used), 1 / p.rate)
     seen = (density(best.output) > np.maximum(left, left.mean())) \
         & (frequency <= (p.record.band_hz or p.rate))
     return frequency[seen].max(initial=0.0)
+
+
+def power_of(problem, values):
+    """Power of values by the frequencies of `numpy.fft.rfft`, where samples count."""
+    return np.abs(np.fft.rfft(values * problem.used))**2
 
 
 def end_of_band_hz(problem):

@@ -14,6 +14,7 @@ from .links import (
     highest_hz,
     highest_seen_hz,
     largest_damping,
+    power_of,
 )
 
 # Share of the motion's power beyond whose frequencies none is seen, and times the highest of these
@@ -102,19 +103,15 @@ def unseen_by_reference(engine, best, takes):
     the sensor shows what no model can know."""
     p = engine.problem
     frequency = np.fft.rfftfreq(len(p.used), 1 / p.rate)
-    unseen = np.zeros(len(frequency), bool)
-    for effect in best.effects.values():
-        unseen |= effect.shows(frequency) < _UNSHOWN
-    if not unseen.any():
+    shown = {cause: effect.shows(frequency) for cause, effect in best.effects.items()}
+    unseen = np.any([share < _UNSHOWN for share in shown.values()], axis=0)
+    if not np.any(unseen):
         return {}
-
-    def power(fit):
-        return np.abs(np.fft.rfft(fit.residual * p.used))**2
-    with_all, found = power(best), {}
+    left, found = power_of(p, best.residual), {}
     for cause in takes:
-        if not np.all(best.effects[cause].shows(frequency) == 1):
+        if np.any(shown[cause] != 1):
             continue
-        gained = power(engine.best_without(best, cause)) - with_all
+        gained = power_of(p, engine.best_without(best, cause).residual) - left
         if gained[unseen].sum() > _THERE * abs(gained.sum()):
             found[cause] = "what it explains lies where the reference has next to nothing of the " \
                            "motion"

@@ -8,7 +8,15 @@ import numpy as np
 from ...errors import FracAccelError
 from ...model import is_link
 from ...model.parameters import parameter_fields
-from .links import CLEAR_PEAK, MOSTLY, RINGS, end_of_band_hz, filters_of, largest_damping
+from .links import (
+    CLEAR_PEAK,
+    MOSTLY,
+    RINGS,
+    end_of_band_hz,
+    filters_of,
+    largest_damping,
+    power_of,
+)
 
 # Damping ratio below which a link has a peak, and times what is left within half an octave of it
 # (RMS) that it must then take.
@@ -46,7 +54,7 @@ def nothing_at_its_peak(engine, best):
                 or not 0 < largest_damping(effect) <= RINGS:
             continue
         near = np.abs(_octaves_from_its_resonance(p, effect)) < 0.5
-        with_it, without = (float(np.sum(np.abs(np.fft.rfft(fit.residual * p.used)[near])**2))
+        with_it, without = (float(np.sum(power_of(p, fit.residual)[near]))
                             for fit in (best, engine.best_without(best, cause)))
         if with_it > _NO_LESS * without:
             found[cause] = "around its resonance as much is left as without it: what it takes " \
@@ -68,7 +76,7 @@ def _share_at_its_peak(engine, best, effect):
         return None, 0.0
     p = engine.problem
     apart = _octaves_from_its_resonance(p, effect)
-    power = np.abs(np.fft.rfft(best.residual * p.used))**2
+    power = power_of(p, best.residual)
     near = np.abs(apart) < 0.5
     beside = [power[(side * apart > 0.5) & (side * apart < 1.5)] for side in (-1, 1)]
     denser = power[near].mean() / max(part.mean() for part in beside) \
