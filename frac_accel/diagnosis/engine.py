@@ -147,7 +147,7 @@ class Engine:
         if all(self._errs_in_both(fit.residual, last)
                for fit in (self.search.baseline, self.everyday())):
             return p.used & last
-        return p.used & alternating_stretches(reference, STRETCHES)
+        return p.used & alternating_stretches(reference, STRETCHES, p.used)
 
     def _errs_in_both(self, error, last):
         """Whether an error is about as large where a mask is set and where it is not."""

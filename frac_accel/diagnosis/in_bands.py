@@ -1,4 +1,4 @@
-"""Whether what changes with time does so alike at all frequencies."""
+"""Whether what a cause adds is as large as it should be at all frequencies."""
 
 import itertools
 
@@ -12,6 +12,8 @@ from ..model.effects.base import OFFSET
 _BANDS = 4
 _APART = 0.1
 _SURE = 6.0
+# Fewest bands, and standard uncertainty of the size in each, by which a cause acts alike in all.
+_FEWEST, _KNOWN = 3, 0.03
 # Lines over which a band's power must be spread for its scatter to say how sure that is.
 _LINES = 8
 
@@ -46,6 +48,15 @@ def otherwise_in_bands(engine, best, added):
             found[cause] = f"at some frequencies it is {low:.2f} of its size, at others " \
                            f"{high:.2f}: what changes with time is something else"
     return found
+
+
+def alike_in_bands(engine, best, added):
+    """Whether what a cause adds, shape (n,), has the same size at all frequencies: of a delay, that
+    its phase is a straight line through zero."""
+    used = engine.problem.used
+    sizes = _sizes(np.where(used, added, 0.0), np.where(used, best.residual, 0.0))
+    return len(sizes) >= _FEWEST and all(
+        std < _KNOWN and abs(size - 1) < _APART for size, std in sizes)
 
 
 def _sizes(added, residual):

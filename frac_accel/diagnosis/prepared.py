@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from ..errors import FracAccelError, IdentificationError
-from ..identification.checks.clipped import clipped_sensor
+from ..identification.checks.clipped import clipped_before_resampling, clipped_sensor
 from ..identification.checks.record_checks import moving_samples, unclipped_reference
 from ..model import AXES
 from ..model.core import Gain, Oscillator
@@ -35,12 +35,16 @@ def with_motion(record, column):
 def with_limits(found, record, column, used):
     """`Integrity` with limits at which too few samples pile up to be certain by themselves, where
     a classical sensor, identified without them, goes beyond."""
-    if record.resampled:
+    if "sensor" in record.resampled:
+        measured = record.topics[1].values[:, column]
+        clipping = clipped_before_resampling(record, column, used)
+    elif record.resampled:
         return found
-    measured = record.sensor[:, column]
-    certain = (measured == found.lower) | (measured == found.upper)
-    clipping = clipped_sensor(record.reference[:, column], measured, used & ~certain, found.step,
-                              record.sampling_rate_hz, record.lag_s)
+    else:
+        measured = record.sensor[:, column]
+        certain = (measured == found.lower) | (measured == found.upper)
+        clipping = clipped_sensor(record.reference[:, column], measured, used & ~certain,
+                                  found.step, record.sampling_rate_hz, record.lag_s)
     if not clipping.samples.any():
         return found
     lower = clipping.lower if found.lower is None else found.lower

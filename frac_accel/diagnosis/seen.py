@@ -128,7 +128,7 @@ class Seen:
         these if they are to be `even`."""
         topic = self.record.topics[1]
         seconds = (topic.stamps_ns - topic.stamps_ns[0]) * 1e-9
-        stamped = self._place(seconds)
+        stamped = self.record.place(seconds)
         if "sensor" in self.record.resampled:
             return self._beside(stamped)
         slot = (topic.clock.slot + np.round(np.median(
@@ -151,7 +151,7 @@ class Seen:
         if "sensor" in self.record.resampled:
             clock, count = self.record.topics[1].clock, len(self.record.topics[1])
             start = clock.instants_s(self.record.topics[1].stamps_ns)[0]
-            return self._beside(self._place(start + np.arange(count) / clock.rate_hz))
+            return self._beside(self.record.place(start + np.arange(count) / clock.rate_hz))
         counted = np.flatnonzero(self.record.valid)
         used = self.used[counted]
         return (self.measured[counted][used], self.output[counted][used],
@@ -199,7 +199,7 @@ class Seen:
     def _before_resampling(self):
         """Which of the topic's samples are `as_recorded`, their places, and those."""
         topic = self.record.topics[1]
-        place = self._place(topic.clock.instants_s(topic.stamps_ns))
+        place = self.record.place(topic.clock.instants_s(topic.stamps_ns))
         slot = np.round(place).astype(int)
         good = (slot >= 0) & (slot < len(self.output))
         good[good] = self.rows[slot[good]]
@@ -210,12 +210,6 @@ class Seen:
         """Values before they were resampled, the output at their instants and at other places."""
         good, _, values, output, used = self._before_resampling()
         return values[used], output[used], self._output_at(place[good][used])
-
-    def _place(self, seconds):
-        """Places among the record's instants of times after the topic's first stamp."""
-        record = self.record
-        start_s = (record.topics[1].stamps_ns[0] - record.start_ns) * 1e-9 - record.lag_s
-        return (start_s + seconds) * record.sampling_rate_hz
 
     def _output_at(self, place):
         """Simulated output between the record's instants."""

@@ -24,12 +24,18 @@ _CERTAIN = 4
 _NEXT_VALUES = 2
 # What stands at one value for a larger share of the record rests there.
 _RESTING = 0.4
-# How far beyond the limit the model goes in the middle of the clipped samples: steps of the
-# lattice (half a step is rounding), standard deviations of what it leaves of the others, and of
-# the channel (a slightly nonlinear sensor stays below the model at its crests).
+# How far the model goes in the middle of the clipped samples beyond what those next to them lead to
+# expect: steps of the lattice (half a step is rounding), standard deviations of the channel (a
+# slightly nonlinear sensor stays below the model at its crests), and of what the model leaves of
+# the others: fewer where the limit is reached often, more of few samples [over the square roots of
+# the numbers of stays and samples].
 _BEYOND_STEPS = 0.55
-_BEYOND_NOISE = 0.5
 _BEYOND = 0.05
+_BEYOND_NOISE = 0.5
+_BEYOND_OFTEN = 5.0
+_BEYOND_FEW = 5.0
+# Samples next to a limit, at least, and per sample at it.
+_NEXT = 20
 
 
 class Pile(NamedTuple):
@@ -90,6 +96,25 @@ def pile_up(values):
         if count >= _PILE_UP * next_count else None
 
 
+def _beyond(values, expected, at_limit, others):
+    """How far the middle of what is expected at the greatest values lies beyond what it is at those
+    next to them: of what a model does not know, such as noise, both have their share."""
+    rows = np.flatnonzero(others)
+    count = min(max(_NEXT, int(at_limit.sum())), len(rows))
+    near = rows[np.argpartition(values[rows], -count)[-count:]]
+    apart = values[at_limit][0] - np.mean(values[near])
+    centred = values[rows] - np.mean(values[rows])
+    slope = centred @ expected[rows] / max(centred @ centred, 1e-300)
+    return np.median(expected[at_limit]) - np.median(expected[near]) - slope * apart
+
+
+def _times_noise(samples):
+    """How far a limit must lie beyond what a model leaves where these samples stand at it."""
+    stays = np.count_nonzero(np.diff(np.r_[False, samples].astype(int)) > 0)
+    return max(_BEYOND_FEW / np.sqrt(samples.sum()),
+               min(_BEYOND_NOISE, _BEYOND_OFTEN / np.sqrt(stays)))
+
+
 def _is_held(values, top):
     """Whether the top is reached a few times only, and values elsewhere stay the same for as long,
     as often."""
@@ -138,10 +163,10 @@ def clipped(values, valid, step, model):
     except IdentificationError:
         # what the other samples cannot tell stays unknown; the fit of all of them will say why
         return Clipping(none)
-    least = max(_BEYOND_STEPS * (step or 0.0),
-                _BEYOND_NOISE * np.std((values - expected)[others]),
-                _BEYOND * np.std(values[valid]))
+    noise = np.std((values - expected)[others])
+    least = max(_BEYOND_STEPS * (step or 0.0), _BEYOND * np.std(values[valid]))
     found = {side: samples for side, samples in suspect.items()
-             if np.median(side * (expected - values)[samples]) > least}
+             if _beyond(side * values, side * expected, samples, others)
+             > max(least, noise * _times_noise(samples))}
     limits = (float(values[found[side]][0]) if side in found else None for side in (-1, 1))
     return Clipping(np.any([none, *found.values()], axis=0), *limits)

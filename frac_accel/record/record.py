@@ -180,6 +180,11 @@ class Record:
         found[reached[(reached >= 0) & (reached < len(self))]] = True
         return found
 
+    def place(self, seconds):
+        """Places among the record's instants of times [s] after the sensor's first stamp."""
+        start_s = (self.topics[1].stamps_ns[0] - self.start_ns) * 1e-9 - self.lag_s
+        return (start_s + seconds) * self.sampling_rate_hz
+
     def beyond(self, column):
         """`Beyond` of one axis: what the sensor shows where a slower reference cannot; None without
         one, or where the sensor has no uniform instants of its own."""

@@ -168,3 +168,26 @@ def test_noise_of_the_reference_shows_behind_a_high_pass(seed):
     noise = named["reference_noise"]
     assert abs(noise.effect.std - std) < 4 * noise.std["std"]
     assert noise.effect.std == pytest.approx(std, rel=0.05)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", range(4))
+def test_a_late_reference_beside_a_high_pass(seed):
+    """The lead is one at all frequencies, and a high-pass has no lag that it could take back: both
+    had no name, though nothing was left, where the lead is shorter than what stamps prove."""
+    rng, rate = np.random.default_rng([46, seed]), 200.0
+    motion = road(rng, rate, 100, 0.3, 40.0)
+    motion = 9.81 + motion / motion.std()
+    corner, late = np.exp(rng.uniform(np.log(0.05), np.log(0.5))), rng.uniform(0.003, 0.009)
+    sensor = high_passed(motion, FINE * rate, corner)[::FINE]
+    time = np.arange(len(motion)) / (FINE * rate)
+    reference = CubicSpline(time, motion)(np.maximum(time[::FINE] - late, 0))
+    n = len(sensor)
+    found = diagnose(pair(rate, reference + 0.003 * rng.normal(size=n),
+                          sensor + 0.005 * rng.normal(size=n), "z"),
+                     SensorModel(Gain(1.0)), axis="z", time_limit_s=60)
+    named = {finding.cause: finding.effect for finding in found.findings}
+    assert set(named) == {"ac_coupling", "reference_delay"}
+    assert named["ac_coupling"].corner_hz == pytest.approx(corner, rel=0.02)
+    assert named["reference_delay"].delay_s == pytest.approx(late, abs=3e-5)
+    assert found.verdict == "explained"

@@ -5,6 +5,7 @@ import numpy as np
 from ...model import is_link
 from ...model.core import Gain, Oscillator
 from ...model.effects.base import Effect
+from ..in_bands import alike_in_bands
 from ..late_reference import is_reference_late, leads
 from .links import (
     AS_LATE,
@@ -83,8 +84,12 @@ def _taken_back(engine, best, links):
     digital = not _leads_less(engine, best, lead)
     strange = [cause for cause in own if not links[cause].everyday and not (
         digital and lead < min(links[cause].pure_delay_s(), 1 / p.rate))]
-    # a high-pass has nothing that a lead would take back, where another filter has
-    strange = [cause for cause in strange if not leads(links[cause])] or strange
+    # a high-pass has nothing that a lead would take back: not where another filter has, or where
+    # the lead is one at all frequencies
+    slowly = [cause for cause in strange if leads(links[cause])]
+    if len(slowly) < len(strange) or all(
+            alike_in_bands(engine, best, engine.added(best, cause)) for cause in ahead):
+        strange = [cause for cause in strange if cause not in slowly]
     if lead >= _NO_LEAD / p.rate and strange and not is_reference_late(p, best.effects):
         return dict.fromkeys([*ahead, *strange], f"a lead of {lead:.3g} s, which only a fit beside "
                              "a filter shows: together they imitate something else")
@@ -92,7 +97,8 @@ def _taken_back(engine, best, links):
             if cause in links and links[cause].of_reference}
     return {cause: f"a lead of {its:.3g} s beside a filter, less than a sampling interval: a "
                    "digital filter has one of its own"
-            for cause, its in late.items() if own and its < 1 / p.rate} | {
+            for cause, its in late.items()
+            if its < 1 / p.rate and any(not leads(links[other]) for other in own)} | {
         cause: _LEAST.format(its) for cause, its in late.items() if its < _NO_LEAD / p.rate}
 
 

@@ -1,6 +1,7 @@
 """What the samples that are not clipped say of those that may be."""
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from ...errors import IdentificationError
 from ...record.clipping import clipped
@@ -36,6 +37,39 @@ def clipped_sensor(reference, sensor, valid, step, sampling_rate_hz, lag_s):
         fit = fit_output_error(structure, reference, sensor, sampling_rate_hz, others, lag_s)
         return predicted(structure, fit, reference, sampling_rate_hz, lag_s)
     return clipped(sensor, valid, step, model)
+
+
+def clipped_before_resampling(record, column, used):
+    """Clipped samples of a sensor that was resampled: of its topic's, by a classical sensor
+    identified without them from a slower reference. What is faster is noise there.
+
+    Parameters
+    ----------
+    record : Record
+    column : int
+    used : ndarray of bool, shape (n,)
+        Which of the record's instants count.
+
+    Returns
+    -------
+    Clipping
+    """
+    topic = record.topics[1]
+    values = topic.values[:, column]
+    place = record.place(topic.clock.instants_s(topic.stamps_ns))
+    slot = np.clip(np.round(place).astype(int), 0, len(record) - 1)
+    valid = used[slot] & (np.abs(place - slot) < 1)
+
+    def model(others):
+        taken = values[valid & ~others]
+        free = used & ~record.instants_of(lambda own: np.isin(own, taken), column)
+        seen, structure = record.comparable(column, free), OscillatorStructure()
+        reference = seen.reference[:, column]
+        fit = fit_output_error(structure, reference, seen.sensor[:, column],
+                               record.sampling_rate_hz, free, record.lag_s)
+        expected = predicted(structure, fit, reference, record.sampling_rate_hz, record.lag_s)
+        return CubicSpline(np.arange(len(expected)), expected)(np.clip(place, 0, len(record) - 1))
+    return clipped(values, valid, topic.step(column), model)
 
 
 def clipped_reference(reference, sensor, valid, step):

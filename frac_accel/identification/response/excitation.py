@@ -297,9 +297,10 @@ def held_out(reference, valid=None):
     moving = reference - reference.mean()
     if np.std(moving[last]) < _QUIET_END * np.std(moving[~last]) \
             or min(last.sum(), np.sum(~last)) < _FEW_SAMPLES * len(last):
-        return alternating_stretches(reference, STRETCHES)
+        return alternating_stretches(reference, STRETCHES, valid)
     if is_new(moving[~last], moving[last]):
-        return alternating_stretches(reference, min(_OF_SWEEP, len(reference) // _SHORTEST))
+        return alternating_stretches(reference, min(_OF_SWEEP, len(reference) // _SHORTEST),
+                                     valid)
     return last
 
 
@@ -312,13 +313,14 @@ def held_out_of(reference, used):
         else held_out(reference, used)
 
 
-def alternating_stretches(reference, count):
+def alternating_stretches(reference, count, valid=None):
     """Every other of `count` stretches in which the reference has equal energy, as a mask.
 
     What is learnt from the others is judged under the same kind of motion: the end of a shock is
-    not like its beginning.
+    not like its beginning. The first one is learnt from: only there what was before the record
+    shows. Only `valid` samples count, if given.
     """
-    energy = _energy(reference)
+    energy = _energy(reference, valid)
     return (energy * (count / max(energy[-1], 1e-300))).astype(int) % 2 == 1
 
 

@@ -62,26 +62,28 @@ class Clipping(Effect):
         return Reading(dict.fromkeys(reached, resolution),
                        error, measured - self.simulate(output, None),
                        "; ".join(words for words in seen.found.words if "limit" in words),
-                       evident=_goes_beyond(measured, error, at_limit, used))
+                       evident=self._goes_beyond(measured, error, used))
 
     def _bends(self, measured, error, free):
-        near = free & ((measured <= _NEAR * self.lower) | (measured >= _NEAR * self.upper))
+        centre = np.median(measured)  # gravity may stand far from zero
+        near = free & ((measured - centre <= _NEAR * (self.lower - centre))
+                       | (measured - centre >= _NEAR * (self.upper - centre)))
         away = free & ~near
         if near.sum() < _TELL or away.sum() < _TELL:
             return False
         return np.std(error[near]) > _LARGER * np.std(error[away])
+
+    def _goes_beyond(self, measured, error, used):
+        """Whether the motion goes on far beyond where the values stand."""
+        low, high = measured <= self.lower, measured >= self.upper
+        if not (low | high).any():
+            return False
+        beyond = np.r_[error[low] > 0, error[high] < 0]
+        return bool(beyond.mean() >= _BEYOND and np.sqrt(np.mean(error[low | high]**2))
+                    > _FAR * np.std(error[used]))
 
     def simulate(self, values, circumstances):
         return np.clip(values, self.lower, self.upper)
 
     def limits(self):
         return self.lower, self.upper
-
-
-def _goes_beyond(measured, error, at_limit, used):
-    """Whether the motion goes on far beyond where the values stand."""
-    if not at_limit.any():
-        return False
-    beyond = error[at_limit] * np.sign(measured[at_limit]) < 0
-    return bool(beyond.mean() >= _BEYOND and np.sqrt(np.mean(error[at_limit]**2))
-                > _FAR * np.std(error[used]))

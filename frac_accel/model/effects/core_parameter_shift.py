@@ -2,9 +2,14 @@
 
 import dataclasses
 
+import numpy as np
+
 from ..parameters import parameter, parameter_fields
 from .base import CORE, Effect, Open, require_oscillator
-from .fit_starts import Start
+from .fit_starts import Start, is_far, matching
+
+# Frequencies [of the core's] and damping ratios among which one far from the core's is looked for.
+_FREQUENCIES, _RATIOS = np.geomspace(0.25, 4.0, 41), np.geomspace(0.01, 2.0, 12)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,6 +49,13 @@ class CoreParameterShift(Effect):
 
     @classmethod
     def starts(cls, view):
-        frequency, ratio = view.core.natural_frequency_hz, view.core.damping_ratio
-        return [Start(cls(1.003 * frequency, 1.01 * ratio),
-                      (cls(1.003 * frequency, ratio), cls(frequency, 1.01 * ratio)), "free")]
+        core = view.core
+        frequency, ratio = core.natural_frequency_hz, core.damping_ratio
+        near = Start(cls(1.003 * frequency, 1.01 * ratio),
+                     (cls(1.003 * frequency, ratio), cls(frequency, 1.01 * ratio)), "free")
+        if not is_far(view):
+            return [near]
+        others = [cls(float(factor * frequency), float(other))
+                  for factor in _FREQUENCIES for other in _RATIOS]
+        return [near, *matching(view, others, 1, lambda effect, s: (
+            effect.change_core(core).transfer_function(s) / core.transfer_function(s)))]

@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+# Sampling rates at which a core's resonance is nowhere in a record.
+_FAR_BEYOND = 10.0
 # Longest segment of an averaged spectrum, and the largest delay that is tried beside a link
 # [samples].
 _LONGEST_SEGMENT = 1024
@@ -196,8 +198,7 @@ def by_equation(view, cause, power):
         None where the motion is nearly linear, or such a force does not explain most of what is
         left.
     """
-    if not view.is_motion or np.std(view.residual[view.used]) \
-            < _STRONG * np.std(view.measured[view.used]):
+    if not view.is_motion or not is_far(view):
         return []
     try:
         found = view.equation.with_power(power)
@@ -277,7 +278,21 @@ def spectral_peaks(view, count=3):
     return [top * view.rate / len(view.residual) for top in found]
 
 
-def matching(view, links, count=2):
+def is_far(view):
+    """Whether a fit leaves so much of the output that nothing near it may describe the record."""
+    return bool(np.std(view.residual[view.used]) >= _STRONG * np.std(view.measured[view.used]))
+
+
+def beyond_band(view):
+    """The core as it would be with its resonance far beyond all that is recorded, where a fit may
+    move it; else None."""
+    if not {"natural_frequency_hz", "damping_ratio"} <= view.open_core:
+        return None
+    return dataclasses.replace(view.core, natural_frequency_hz=_FAR_BEYOND * view.rate,
+                               damping_ratio=math.sqrt(0.5))
+
+
+def matching(view, links, count=2, response=None, core=None, lost=False):
     """Starts of the linear links that come nearest to what is between simulated and measured.
 
     Their responses are compared with the averaged ratio of the two, where there is power: as they
@@ -289,6 +304,14 @@ def matching(view, links, count=2):
     links : list of Effect
     count : int
         How many of either comparison.
+    response : callable, optional
+        What one of them, given with s, shape (n,) [rad/s], changes of the output, shape (n,);
+        default: a link's own response.
+    core : Oscillator, optional
+        What the sensor's core is beside these links, where a fit may move it.
+    lost : bool
+        Whether the responses say what the simulated output has of the measured one, and not the
+        other way round: where that is little, no ratio to it is known.
 
     Returns
     -------
@@ -298,21 +321,41 @@ def matching(view, links, count=2):
     size = min(_LONGEST_SEGMENT, max(64, len(view.measured) // 8))
     simulated = (view.simulated - view.simulated[view.used].mean()) * view.used
     measured = (view.measured - view.measured[view.used].mean()) * view.used
-    frequency, power = welch(simulated, view.rate, nperseg=size)
-    ratio = csd(simulated, measured, view.rate, nperseg=size)[1] / np.maximum(power, 1e-300)
+    one, other = (measured, simulated) if lost else (simulated, measured)
+    frequency, power = welch(one, view.rate, nperseg=size)
+    ratio = csd(one, other, view.rate, nperseg=size)[1] / np.maximum(power, 1e-300)
     strong = power > 1e-6 * power.max()
     strong[0] = False
     s, ratio, weight = 2j * np.pi * frequency[strong], ratio[strong], power[strong]
-    responses = np.array([link.transfer_function(s) * np.exp(-s * link.pure_delay_s())
-                          for link in links])
+    if core is not None:
+        moved = core.transfer_function(s) / view.core.transfer_function(s)
+        ratio, weight = (ratio * moved, weight) if lost else \
+            (ratio / moved, weight * np.abs(moved)**2)
+    responses = np.array([(response or _response)(link, s) for link in links])
     plain = np.abs(responses - ratio)**2 @ weight
-    delays = np.linspace(-_MOST_DELAY, _MOST_DELAY, 16 * _MOST_DELAY + 1) / view.rate
-    turned = np.exp(np.outer(s, delays))
-    shared = np.abs(np.real((np.conj(responses) * ratio * weight) @ turned))
-    explained = np.max(shared, axis=1)**2 / (np.abs(responses)**2 @ weight)
-    lag = delays[np.argmax(shared, axis=1)]
-    return [finite(links[i]) for i in np.argsort(plain)[:count]] + [
-        finite(links[i])._replace(lag_s=float(lag[i])) for i in np.argsort(-explained)[:count]]
+    best = []
+    # a delay that is there may stand for that of the link
+    for ahead in np.zeros(len(links)), _mean_delays(responses, s, weight):
+        within = np.linspace(-_MOST_DELAY, _MOST_DELAY, 16 * _MOST_DELAY + 1) / view.rate
+        others = responses * np.exp(np.outer(ahead, s))
+        shared = np.abs(np.real((np.conj(others) * ratio * weight) @ np.exp(np.outer(s, within))))
+        explained = np.max(shared, axis=1)**2 / (np.abs(responses)**2 @ weight)
+        lag = within[np.argmax(shared, axis=1)] - ahead
+        best += [(explained[i], links[i], float(lag[i])) for i in np.argsort(-explained)[:count]]
+    found = [finite(links[i]) for i in np.argsort(plain)[:count]] + [
+        finite(link)._replace(lag_s=-lag if lost else lag)
+        for _, link, lag in sorted(best, key=lambda entry: -entry[0])[:count]]
+    return found if core is None else [start._replace(kind="whole", core=core) for start in found]
+
+
+def _mean_delays(responses, s, weight):
+    """Delays [s] that come nearest to the phases of some responses, a row each."""
+    omega = s.imag
+    return -np.unwrap(np.angle(responses), axis=1) @ (weight * omega) / (weight @ omega**2)
+
+
+def _response(link, s):
+    return link.transfer_function(s) * np.exp(-s * link.pure_delay_s())
 
 
 def coherent_from_hz(view):

@@ -24,6 +24,8 @@ _UNRELATED = 0.15
 _AT_MOST = 0.5
 # Standard deviations by which the motion's rank in bursts may exceed that at any time.
 _DEVIATIONS = 4.0
+# Chance below which so many bursts do not begin at one place of the motion.
+_NO_CHANCE = 1e-5
 # Times the motion's mean power that bursts may meet, and the share of other times in the record at
 # which they would have met as much, below which it has made them.
 _MEETS, _HARDLY = 4.0, 0.02
@@ -188,6 +190,8 @@ def _follows(inside, error, output, count):
     from scipy.stats import rankdata
     slope = np.gradient(output)
     bend = np.gradient(slope)
+    if _struck(inside, output, slope):
+        return True
     # as many stretches as long as a burst could be one, and as many in them are independent
     stretches, samples = count / inside.mean(), max(inside.sum() / _WINDOW, count)
     moving = output - output.mean()
@@ -202,6 +206,18 @@ def _follows(inside, error, output, count):
         if abs(np.corrcoef(values[inside], error[inside])[0, 1]) > _allowed(samples):
             return True
     return False
+
+
+def _struck(inside, output, slope):
+    """Whether bursts begin where the motion comes to a certain place or size, or mostly on the way
+    out or back, as where a loose part strikes."""
+    from scipy.stats import binomtest, kstest, rankdata
+    starts = np.flatnonzero(np.diff(np.r_[0, inside.astype(int)]) == 1)
+    moving = output - np.median(output)
+    places = [rankdata(values)[starts] / len(values) for values in (moving, np.abs(moving))]
+    outward = int(np.sum(moving[starts] * slope[starts] > 0))
+    return binomtest(outward, len(starts)).pvalue < _NO_CHANCE \
+        or any(kstest(place, "uniform").pvalue < _NO_CHANCE for place in places)
 
 
 def _meets_the_motion(inside, power):

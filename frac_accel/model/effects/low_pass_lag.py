@@ -6,7 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import CONDITIONER, Effect
-from .fit_starts import grid
+from .fit_starts import grid, matching
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,4 +30,5 @@ class LowPassLag(Effect):
 
     @classmethod
     def starts(cls, view):
-        return grid([cls(corner) for corner in view.rate * np.geomspace(0.002, 9, 16)])
+        links = [cls(corner) for corner in view.rate * np.geomspace(0.002, 9, 16)]
+        return [*grid(links), *matching(view, links)]

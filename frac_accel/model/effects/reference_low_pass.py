@@ -6,7 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import REFERENCE, Effect
-from .fit_starts import grid
+from .fit_starts import grid, matching
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,4 +36,5 @@ class ReferenceLowPass(Effect):
 
     @classmethod
     def starts(cls, view):
-        return grid([cls(corner) for corner in view.rate * np.geomspace(2e-3, 20, 20)])
+        links = [cls(corner) for corner in view.rate * np.geomspace(2e-3, 20, 20)]
+        return [*grid(links), *matching(view, links)]

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import REFERENCE, Effect
-from .fit_starts import matching, of_orders
+from .fit_starts import beyond_band, matching, of_orders
 
 # Nearly a bell curve.
 _MOST = 16
@@ -14,7 +14,7 @@ _MOST = 16
 _LOST = 0.1
 # Share of a motion's size of which nothing is seen in a reference's noise, lines at least that tell
 # this noise, and the part of them that has no more (some may lie beyond the reference's band).
-_NOTHING, _TELL, _NO_MORE = 2e-3, 32, 0.5
+_NOTHING, _TELL, _NO_MORE = 2e-3, 8, 0.5
 # Times this noise that the power of some lines may have by chance, and more the more it would be
 # raised; and so many times more from which on it is surely the motion's.
 _BY_CHANCE, _RAISED, _RAMP = 1.6, 0.01, 0.4
@@ -87,13 +87,22 @@ class ReferenceSmoothing(Effect):
 
     @classmethod
     def starts(cls, view):
-        near = matching(view, [
-            cls(float(length), order) for length in np.geomspace(0.3, 100, 80) / view.rate
-            for order in (1, 2, 4, 16)])
+        coarse = [cls(float(length), order) for length in np.geomspace(0.3, 100, 80) / view.rate
+                  for order in (1, 2, 4, 16)]
+        # a core that was identified may have its resonance where the motion is lost
+        cores = [None] if beyond_band(view) is None else [None, beyond_band(view)]
+        near = [matching(view, coarse, core=core, lost=True, response=_of_motion)
+                for core in cores]
         # a notch in the wrong place turns the sign of what is beside it: no fit comes from afar
-        return matching(view, [
-            dataclasses.replace(start.effect, length_s=start.effect.length_s * (1 + apart))
-            for start in near for apart in np.linspace(-_APART, _APART, 2 * _FINE + 1)])
+        return [start for core, found in zip(cores, near) for start in matching(view, [
+            dataclasses.replace(other.effect, length_s=other.effect.length_s * (1 + apart))
+            for other in found for apart in np.linspace(-_APART, _APART, 2 * _FINE + 1)],
+            core=core, lost=True, response=_of_motion)]
+
+
+def _of_motion(effect, s):
+    """What of the motion such a reference holds."""
+    return effect._kept(s.imag / (2 * np.pi)).astype(complex)
 
 
 def _turned_back(kept):
