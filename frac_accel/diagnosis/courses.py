@@ -19,6 +19,9 @@ _SHORT = 80_000
 # Share of what is left without a course that it must take of data that it has not seen, and by how
 # much more (power) others, such as a course of the timing, must leave.
 _TAKES, _CLEARLY = 0.5, 2.0
+# The same of a motion about a level so many times its size: of courses of its gain and its zero the
+# wrong one leaves hardly more, which is no other cause's, since either takes all of the other's.
+_LEVEL, _CLEARLY_OF_LEVEL = 3.0, 1.2
 # Share by which more half waves must be better.
 _BETTER = 0.02
 # Share of the residual's power that a description with a course may leave; and where that had other
@@ -118,19 +121,21 @@ def course_of(engine, best):
             target, before = _to_be_described(p, kept, cls)
         except FracAccelError:
             continue  # without the like of it, the motion has no bound
-        left, waves, power = _left(cls.column(before), target, cls.half_waves, p.used)
+        own = _beside_a_gain(cls.column(before), before, target, cls.half_waves, p)
+        left, waves, power = _left(cls.column(before), own, cls.half_waves, p.used)
         if left > 1 - _TAKES or power > _allowed(best.effects, kept) * own_power:
             continue
-        others = [_left(column, target, cls.half_waves, p.used)[0] for column in
-                  (np.ones(len(before)), before, np.gradient(before))
+        columns = np.ones(len(before)), before, np.gradient(before)
+        others = [_left(column, _beside_a_gain(column, before, target, cls.half_waves, p),
+                        cls.half_waves, p.used)[2] for column in columns
                   if not np.array_equal(column, cls.column(before))]
-        if min(others) < _CLEARLY * left:
+        if min(others) < (_CLEARLY_OF_LEVEL if _is_level(before[p.used]) else _CLEARLY) * power:
             continue
-        effect = _through(p, cls, before, target, waves, p.used)
+        effect = _through(p, cls, before, own, waves, p.used)
         values, weight = _values(effect), _mean(cls.column(before)**2, p.used)
         if _as_level(values, weight, before, p.used, waves) < _ALIKE \
                 and not (_adds(cls) and _as_motion(values, weight, before, p.used)) \
-                and _left_by_level(cls.column(before), target, before, p.used) > power:
+                and _left_by_level(cls.column(before), own, before, p.used) > power:
             found.append((left, cause, effect))
     return {cause: effect for _, cause, effect in sorted(found, key=lambda each: each[:2])[:1]}
 
@@ -209,6 +214,23 @@ def _left(column, target, half_waves, used):
         if here < (1 - _BETTER) * least:
             least, chosen = here, waves
     return least / max(constant, 1e-300), chosen, least
+
+
+def _is_level(values):
+    return abs(np.mean(values)) > _LEVEL * np.std(values)
+
+
+def _beside_a_gain(column, before, target, half_waves, p):
+    """A target without what another gain of the motion about its level takes beside a course: that
+    gain was found without the course, and of a level a course of the gain makes as much as one of
+    the zero."""
+    used = p.used
+    moving = before - before[used].mean()
+    every = np.c_[_columns(p.time / p.time[-1], range(half_waves[-1] + 1)) * column[:, None],
+                  moving][used]
+    size = np.maximum(np.linalg.norm(every, axis=0), 1e-300)
+    found = np.linalg.lstsq(every / size, target[used], rcond=1e-9)[0] / size
+    return (target - found[-1] * moving) * used
 
 
 def _columns(place, orders):

@@ -22,7 +22,7 @@ from .gain import gain
 from .leftover import SCATTER, leftover, rounding_errors
 from .names import on_bound, special_case
 from .noise_colour import lead, noise_peak
-from .other_axes import UNLIKE
+from .other_axes import UNLIKE, shows_turn
 from .problem import Problem, acts_on_spring
 from .search import SAME, Search, acts_as_filter, mixes_otherwise
 from .seen import added, grows_with_motion
@@ -244,7 +244,7 @@ class Engine:
                            and not fit.causes & unwanted),
                           key=lambda fit: self.score(fit, variance))
             winner = self._ahead_in_colour(near, self._general(near, variance), variance)
-            winner = next((fit for fit in near if _is_plainer(fit, winner) and self.score(
+            winner = next((fit for fit in near if self._is_plainer(fit, winner) and self.score(
                 fit, variance) < self.score(winner, variance) + _CLOSE), winner)
             if winner is best:
                 return best
@@ -357,6 +357,13 @@ class Engine:
         return {cause: effect for cause, effect in effects.items()
                 if cause not in self.search.base}
 
+    def _is_plainer(self, fit, other):
+        """Whether a set says by shares of the other axes alone what another one says by a turn that
+        these do not show."""
+        return mixes_otherwise(fit, other) and any(
+            fit.effects[cause].describes == "across" for cause in fit.causes - other.causes) \
+            and not shows_turn(self.problem, other.effects)
+
     def rivals(self, best, cause, may_be_more=False, close=_CLOSE):
         """Sets without a cause, no larger than the best, by score; (margin, causes).
 
@@ -373,7 +380,7 @@ class Engine:
         # a hollow one that is close says the same in other words
         return [(margin, causes) for margin, causes in sorted(found, key=lambda entry: entry[0])
                 if margin > close or not (self.hollow(self.search.fits[causes])
-                                          or _is_plainer(best, self.search.fits[causes]))]
+                                          or self._is_plainer(best, self.search.fits[causes]))]
 
     def margin_of_all(self, best, cause):
         """Margin by which a set is ahead of one that leaves twice the power; what is left and is no
@@ -733,10 +740,13 @@ class Engine:
         except FracAccelError:
             return p.clear(best.simulated, best.free)
 
-    def takes(self, best, cause):
-        """RMS that a fit of all samples leaves less with a cause than without it."""
-        less = self.best_without(best, cause)
-        return float(np.sqrt(max(less.cost - best.cost, 0.0) / self.problem.count))
+    def takes(self, best, cause, beside_a_constant=False):
+        """RMS that a fit of all samples leaves less with a cause than without it, or than without
+        it and a constant."""
+        less, used = self.best_without(best, cause), self.problem.used
+        cost = np.sum((less.residual - less.residual[used].mean())[used]**2) \
+            if beside_a_constant else less.cost
+        return float(np.sqrt(max(cost - best.cost, 0.0) / self.problem.count))
 
     def best_without(self, best, cause):
         """The best that is known of a set without a cause: a trial that was left, since it could
@@ -848,12 +858,6 @@ class Engine:
 def _unless_it_grows(left):
     """A `Leftover` without what only comes and goes with the motion."""
     return dataclasses.replace(left, level_score=0.0)
-
-
-def _is_plainer(fit, other):
-    """Whether a set says by shares of the other axes alone what another one says by a turn."""
-    return mixes_otherwise(fit, other) and any(
-        fit.effects[cause].describes == "across" for cause in fit.causes - other.causes)
 
 
 def _once(store, fitted, make):

@@ -17,6 +17,9 @@ _FROM_ACROSS = 0.2
 _ACROSS = 1e-3
 # Share of what another axis leaves (power) below which it shows causes that were found on this one.
 _FOLLOWS = 0.5
+# Standard uncertainties of a share from which it is there, and share of it within which it is what a
+# turn says.
+_SHOWN, _AS_TOLD = 10.0, 0.15
 # Share of another axis that a sensor shows which was mounted by eye (a degree or so), and standard
 # uncertainties from which a zero is more open than its fit alone says.
 _BY_EYE, _MORE_OPEN = 0.02, 2.0
@@ -171,6 +174,22 @@ def _across_for_a_turn(problem, effects, base):
                     for name in others})
     return {**{cause: effect for cause, effect in effects.items()
                if cause not in turns.keys() | gains}, cls.cause: across}
+
+
+def shows_turn(problem, effects):
+    """Whether another axis has the share of the diagnosed one that a turn among these effects gives
+    it: of a turn either has the other's, with opposite signs."""
+    shares, stds = problem.mixing(effects)
+    own = problem.axis
+    for other in (axis for axis in range(len(AXES)) if axis != own):
+        share, std = np.array([shares[other, own], stds[other, own]]) / shares[other, other]
+        for effect in effects.values():
+            if not effect.mixes_axes or effect.describes == "across":
+                continue
+            told = effect.share_of_axes(other)[own] / effect.share_of_axes(other)[other]
+            if abs(told) > _SHOWN * abs(std) and abs(share / told - 1) < _AS_TOLD:
+                return True
+    return False
 
 
 def _bringing_across(problem):

@@ -448,7 +448,7 @@ class Search:
         """(Cost to be expected, cause, effect to begin with) of one start, or None."""
         p, changes = self.problem, []
         if start.kind == "whole":
-            cost = p.cost(self._joined(fitted.effects, start, start.effect), rough=True)
+            cost = self._cost_of_whole(self._joined(fitted.effects, start, start.effect))
             return (cost, cause, start.effect) if cost < fitted.cost else None
         slow = _orthonormal(p.own_motions(start.effect).whole()[rows])
         own = _orthonormal(slow - known @ (known.T @ slow))
@@ -488,6 +488,28 @@ class Search:
             effect = dataclasses.replace(effect, **{start.parameter: float(scaled)})
         cost += share * (factor**2 * size - 2 * factor * shared)
         return cost, cause, effect
+
+    def _cost_of_whole(self, effects):
+        """Cost of some effects, beside another gain where their motion is linear and the core's is
+        free: that was found beside another response."""
+        p = self.problem
+        try:
+            point = p.point(effects, True)
+        except FracAccelError:
+            return np.inf
+        if not self._gain_is_free or any(map(acts_on_spring, effects.values())):
+            return point.cost
+        moving = p.clear(point.simulated, point.free)
+        moving = moving - moving[p.used].mean() * p.used
+        shared = moving @ point.residual
+        return point.cost - shared**2 / max(moving @ moving, np.finfo(float).tiny)
+
+    @functools.cached_property
+    def _gain_is_free(self):
+        """Whether a cause of the base says the core's sensitivity anew."""
+        core = self.problem.baseline.axis(self.problem.axis).core
+        return any(effect.is_constant and is_link(effect) for effect in self.base.values()) \
+            and isinstance(core, Oscillator)
 
     def run(self, threshold, promises, done, seed=None, held=()):
         """Grow sets of causes until nothing is gained, and leave out what is not needed.

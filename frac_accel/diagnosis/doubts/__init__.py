@@ -31,7 +31,7 @@ from .peaks import (
     of_a_further_mode,
     rings_otherwise,
 )
-from .slow import as_slow, elsewhen, of_level
+from .slow import as_slow, elsewhen, of_level, of_unchanged_level
 
 # Share of the output (RMS) above which what is left says that little of the sensor is understood.
 _MOST_OF = 0.5
@@ -57,6 +57,7 @@ def doubts_about(engine, best, gains, stds, left, noise):
             dict.fromkeys(gains, words) if (words := most_is_left(engine, left, noise)) else {},
             gradual(engine, best, gains), otherwise_in_bands(engine, best, added),
             with_level(engine, best, added), of_level(engine, best, added),
+            of_unchanged_level(engine, best),
             as_slow(engine, best, added, takes), of_the_model(engine, best),
             acausal(engine, best, stds), by_what_is_left(engine, best, takes, left),
             _cancelled(engine, best, added), corrections(engine, best, takes),
@@ -85,7 +86,7 @@ def _too_little(engine, best, takes, added, noise):
         # where it was judged: what comes and goes may do less elsewhere
         there = float(np.sqrt(np.mean(added[cause][engine.held_out_rows]**2)))
         # of the whole record: what was learnt may go astray where it is held out
-        gained = min(taken, engine.takes(best, cause))
+        gained = min(taken, engine.takes(best, cause, beside_a_constant=True))
         # what is added behind all dynamics sets nothing in motion
         if max(rms, there) < _BY_ITSELF * gained and effect.stage < OFFSET:
             found[cause] = (f"it changes the output by {there:.3g} RMS only: the rest of what it "

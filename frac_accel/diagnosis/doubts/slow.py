@@ -5,6 +5,7 @@ import math
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ...model.effects import IDENTIFIED
 from ...model.effects.base import GAIN, OFFSET
 from ..engine import WEIGHS
 from .links import MOSTLY, RESEMBLES
@@ -13,8 +14,13 @@ from .links import MOSTLY, RESEMBLES
 # adds (RMS) from which it is slow. Then it must take so many times what is left wanders by: the
 # best step in noise with a long memory takes three to four times that.
 _SLOW_PARTS, _SLOW_SHARE, _SLOW_TIMES = 20, 0.5, 6.0
+# Share of a level within which the sensor shows it as it is, and share of it that a constant must
+# have for that to be strange.
+_UNCHANGED, _PART_OF_LEVEL = 0.02, 0.1
 # Times the median size of what is left from which it stands out.
 _OUTLYING = 10.0
+# Octaves up to the Nyquist frequency in which no zero wanders.
+_FAST_OCTAVES = 3
 # Share of its strength by which the part of it that is not slow may be stronger or weaker.
 _AS_STRONG = 0.1
 
@@ -69,6 +75,24 @@ def of_level(engine, best, added):
     return found
 
 
+def of_unchanged_level(engine, best):
+    """A constant, and a gain beside it, that together leave a level as it is: what changes the gain
+    of the motion, and not that of gravity, does the same."""
+    p, constant = engine.problem, IDENTIFIED["offset"].cause
+    if constant not in best.effects:
+        return {}
+    level = float(np.mean(p.record.reference[p.used, p.axis]))
+    off = float(np.mean(p.measured[p.used])) - level
+    size = abs(best.effects[constant].offset)
+    if not abs(off) < _UNCHANGED * abs(level) or size < _PART_OF_LEVEL * abs(level):
+        return {}
+    return dict.fromkeys(
+        [constant, *(cause for cause, effect in best.effects.items()
+                     if effect.everyday and effect.is_constant and cause != constant)],
+        f"the mean is that of the reference to within {abs(off / level):.1%}: what changes the "
+        "gain of the motion, and not that of its mean, does the same")
+
+
 def _slow_part(problem, values):
     """Running mean over a part of the record."""
     return uniform_filter1d(values, max(problem.count // _SLOW_PARTS, 1))
@@ -101,9 +125,17 @@ def _is_as_strong(problem, change, left):
     return bool(_SLOW_TIMES * std < 1 + off and abs(off) < _AS_STRONG)
 
 
+def _low_lines(in_octaves):
+    """Share of the tones that a zero which wanders may make."""
+    power = np.maximum(in_octaves, 0.0)
+    return float(power[:-_FAST_OCTAVES].sum() / max(power.sum(), np.finfo(float).tiny))
+
+
 def elsewhen(engine, best, takes, left):
     """Causes that grow with time beside which what is left still changes with it."""
     shares, found = {part: share for share, part in engine.structure(best)}, {}
+    if "lines" in shares:
+        shares["lines"] *= _low_lines(engine.budget(best).in_bands["lines"])
     takes = {cause: rms for cause, rms in takes.items()
              if not engine.stands_alone(best, cause, rms)}
     for cause, taken in takes.items():

@@ -333,19 +333,24 @@ def matching(view, links, count=2, response=None, core=None, lost=False):
             (ratio / moved, weight * np.abs(moved)**2)
     responses = np.array([(response or _response)(link, s) for link in links])
     plain = np.abs(responses - ratio)**2 @ weight
-    best = []
+    found = [finite(links[i]) for i in np.argsort(plain)[:count]]
+    within = np.linspace(-_MOST_DELAY, _MOST_DELAY, 16 * _MOST_DELAY + 1) / view.rate
     # a delay that is there may stand for that of the link
     for ahead in np.zeros(len(links)), _mean_delays(responses, s, weight):
-        within = np.linspace(-_MOST_DELAY, _MOST_DELAY, 16 * _MOST_DELAY + 1) / view.rate
         others = responses * np.exp(np.outer(ahead, s))
         shared = np.abs(np.real((np.conj(others) * ratio * weight) @ np.exp(np.outer(s, within))))
         explained = np.max(shared, axis=1)**2 / (np.abs(responses)**2 @ weight)
-        lag = within[np.argmax(shared, axis=1)] - ahead
-        best += [(explained[i], links[i], float(lag[i])) for i in np.argsort(-explained)[:count]]
-    found = [finite(links[i]) for i in np.argsort(plain)[:count]] + [
-        finite(link)._replace(lag_s=-lag if lost else lag)
-        for _, link, lag in sorted(best, key=lambda entry: -entry[0])[:count]]
+        lags = (within[np.argmax(shared, axis=1)] - ahead) * (-1 if lost else 1)
+        found += [finite(links[i])._replace(lag_s=float(lags[i]))
+                  for i in np.argsort(-explained)[:count]]
     return found if core is None else [start._replace(kind="whole", core=core) for start in found]
+
+
+def matching_alone(view, links):
+    """The same, and those that come nearest in the place of the dynamics of a core that was
+    identified, which may stand for a filter."""
+    core = beyond_band(view)
+    return matching(view, links) + ([] if core is None else matching(view, links, 1, core=core))
 
 
 def _mean_delays(responses, s, weight):

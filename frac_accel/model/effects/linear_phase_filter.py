@@ -6,7 +6,7 @@ import numpy as np
 
 from ..parameters import parameter
 from .base import CONDITIONER, Effect
-from .fit_starts import matching, of_orders
+from .fit_starts import matching_alone, of_orders
 
 _MOST = 4
 
@@ -48,6 +48,6 @@ class LinearPhaseFilter(Effect):
 
     @classmethod
     def starts(cls, view):
-        return matching(view, [
+        return matching_alone(view, [
             cls(float(length), order) for length in np.geomspace(0.3, 100, 80) / view.rate
             for order in range(1, _MOST + 1)])

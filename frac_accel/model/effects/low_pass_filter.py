@@ -8,7 +8,7 @@ import numpy as np
 
 from ..parameters import choice, parameter
 from .base import CONDITIONER, Effect
-from .fit_starts import matching
+from .fit_starts import matching_alone
 
 _FAMILIES = ("butterworth", "bessel")
 _LEAST, _MOST = 2, 8
@@ -54,7 +54,7 @@ class LowPassFilter(Effect):
 
     @classmethod
     def starts(cls, view):
-        return matching(view, [
+        return matching_alone(view, [
             cls(float(corner), order, family) for corner in view.rate * np.geomspace(0.01, 2.0, 40)
             for order in range(_LEAST, _MOST + 1) for family in _FAMILIES])
 
