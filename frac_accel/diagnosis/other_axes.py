@@ -17,8 +17,8 @@ _FROM_ACROSS = 0.2
 _ACROSS = 1e-3
 # Share of what another axis leaves (power) below which it shows causes that were found on this one.
 _FOLLOWS = 0.5
-# Standard uncertainties of a share from which it is there, and share of it within which it is what a
-# turn says.
+# Standard uncertainties of a share from which it is there, and share of it within which it is what
+# a turn says.
 _SHOWN, _AS_TOLD = 10.0, 0.15
 # Share of another axis that a sensor shows which was mounted by eye (a degree or so), and standard
 # uncertainties from which a zero is more open than its fit alone says.
