@@ -10,6 +10,9 @@ from ...errors import FracAccelError
 
 # Points of a spring's characteristic from which Newton's method finds the rest, and its steps.
 _GRID, _NEWTON = 257, 3
+# Share of a load beyond what a spring carries that is no more than what between samples is not
+# known better.
+_LITTLE_LESS = 0.01
 
 
 class ForceLaw(NamedTuple):
@@ -143,10 +146,21 @@ class StaticForce:
                                  "output units: its stiffness terms are too large")
         return float(between[np.argmin(np.abs(between))])
 
+    def _carried(self, load):
+        """A load, or one that is less by `_LITTLE_LESS` where the spring carries that only."""
+        try:
+            self.equilibrium(load)
+        except FracAccelError:
+            return load * (1 - _LITTLE_LESS)
+        return load
+
     def at_once(self, load):
         """`equilibrium` under each of some loads, shape (n,), as a mass that follows at once has
-        it: where a sensor is far below its resonance."""
-        ends = self.equilibrium(float(load.min())), self.equilibrium(float(load.max()))
+        it: where a sensor is far below its resonance. A little more than the spring carries counts
+        as what it does: by so much a peak between two samples depends on how these are filled."""
+        least, most = self._carried(float(load.min())), self._carried(float(load.max()))
+        load = np.clip(load, least, most)
+        ends = self.equilibrium(least), self.equilibrium(most)
         carried = np.polynomial.Polynomial([0.0, 1.0, *self.polynomial])
         # from end to end the load grows with the output
         grid = np.linspace(*ends, _GRID)
