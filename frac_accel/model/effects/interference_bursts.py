@@ -24,8 +24,10 @@ _UNRELATED = 0.15
 _AT_MOST = 0.5
 # Standard deviations by which the motion's rank in bursts may exceed that at any time.
 _DEVIATIONS = 4.0
-# Chance below which so many bursts do not begin at one place of the motion.
-_NO_CHANCE = 1e-5
+# Share of the bursts over a half that begin on one way, with the chance below which so many do not;
+# and range of the motion's ranks (half of them, a half by chance) in which they begin at one place.
+_ONE_WAY, _NO_CHANCE = 0.35, 1e-5
+_NARROW = 0.2
 # Times the motion's mean power that bursts may meet, and the share of other times in the record at
 # which they would have met as much, below which it has made them.
 _MEETS, _HARDLY = 4.0, 0.02
@@ -209,15 +211,19 @@ def _follows(inside, error, output, count):
 
 
 def _struck(inside, output, slope):
-    """Whether bursts begin where the motion comes to a certain place or size, or mostly on the way
-    out or back, as where a loose part strikes."""
-    from scipy.stats import binomtest, kstest, rankdata
+    """Whether bursts begin where the motion comes to a certain place or size, or nearly all of them
+    on the way out or back, as where a loose part strikes. Of such as only begin there more often,
+    an error that grows with the motion may be behind it."""
+    from scipy.stats import binomtest, iqr, rankdata
     starts = np.flatnonzero(np.diff(np.r_[0, inside.astype(int)]) == 1)
     moving = output - np.median(output)
-    places = [rankdata(values)[starts] / len(values) for values in (moving, np.abs(moving))]
     outward = int(np.sum(moving[starts] * slope[starts] > 0))
-    return binomtest(outward, len(starts)).pvalue < _NO_CHANCE \
-        or any(kstest(place, "uniform").pvalue < _NO_CHANCE for place in places)
+    if abs(outward / len(starts) - 0.5) > _ONE_WAY and binomtest(
+            outward, len(starts)).pvalue < _NO_CHANCE:
+        return True
+    return len(starts) >= _SEVERAL and any(
+        iqr(rankdata(values)[starts] / len(values)) < _NARROW
+        for values in (moving, np.abs(moving)))
 
 
 def _meets_the_motion(inside, power):
