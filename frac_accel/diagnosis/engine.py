@@ -743,10 +743,9 @@ class Engine:
     def takes(self, best, cause, beside_a_constant=False):
         """RMS that a fit of all samples leaves less with a cause than without it, or than without
         it and a constant."""
-        less, used = self.best_without(best, cause), self.problem.used
-        cost = np.sum((less.residual - less.residual[used].mean())[used]**2) \
-            if beside_a_constant else less.cost
-        return float(np.sqrt(max(cost - best.cost, 0.0) / self.problem.count))
+        less, p = self.best_without(best, cause), self.problem
+        constant = less.residual[p.used].mean() if beside_a_constant else 0.0
+        return float(np.sqrt(max((less.cost - best.cost) / p.count - constant**2, 0.0)))
 
     def best_without(self, best, cause):
         """The best that is known of a set without a cause: a trial that was left, since it could

@@ -39,8 +39,7 @@ def otherwise_in_bands(engine, best, added):
         effect = best.effects[cause]
         if not effect.shows_with_time or effect.stage >= OFFSET:
             continue
-        sizes = _sizes(np.where(engine.problem.used, values, 0.0),
-                       np.where(engine.problem.used, best.residual, 0.0))
+        sizes = _sizes(engine, best, values)
         apart = [(low, high) for (low, one), (high, other) in itertools.permutations(sizes, 2)
                  if high - low > max(_APART, _SURE * np.hypot(one, other))]
         if apart:
@@ -53,16 +52,16 @@ def otherwise_in_bands(engine, best, added):
 def alike_in_bands(engine, best, added):
     """Whether what a cause adds, shape (n,), has the same size at all frequencies: of a delay, that
     its phase is a straight line through zero."""
-    used = engine.problem.used
-    sizes = _sizes(np.where(used, added, 0.0), np.where(used, best.residual, 0.0))
+    sizes = _sizes(engine, best, added)
     return len(sizes) >= _FEWEST and all(
         std < _KNOWN and abs(size - 1) < _APART for size, std in sizes)
 
 
-def _sizes(added, residual):
+def _sizes(engine, best, added):
     """Pairs of size and standard uncertainty of what is added and left, over what is added, in
     bands of equal power, but those of a few lines."""
-    one, other = rfft(added), rfft(residual)
+    one, other = (rfft(np.where(engine.problem.used, values, 0.0))
+                  for values in (added, best.residual))
     power = np.abs(one)**2
     reached = np.cumsum(power) / max(power.sum(), np.finfo(float).tiny)
     edges = [0, *np.searchsorted(reached, np.arange(1, _BANDS) / _BANDS), len(power)]

@@ -37,7 +37,7 @@ def with_limits(found, record, column, used):
     a classical sensor, identified without them, goes beyond."""
     if "sensor" in record.resampled:
         measured = record.topics[1].values[:, column]
-        clipping = clipped_before_resampling(record, column, used)
+        clipping = clipped_before_resampling(record, column, used, (found.lower, found.upper))
     elif record.resampled:
         return found
     else:

@@ -91,3 +91,20 @@ def test_a_limit_beside_a_slower_reference(seed):
     assert min(off) <= step / 2 + 1e-9
     assert all(one <= step / 2 + 1e-9 or one > 1e3 for one in off)
     assert set(named) <= {"clipping", "quantization", "reference_noise"}
+
+
+def test_certain_limits_beside_a_slower_reference_are_told_once():
+    """What is certain by itself asks no model."""
+    rng, rate = np.random.default_rng(65), 200.0
+    count = int(60 * rate)
+    motion = sosfiltfilt(butter(2, [0.5, 15.0], "band", fs=rate, output="sos"),
+                         rng.normal(size=count))
+    motion = motion / motion.std()
+    sensor = np.clip(motion + 0.01 * rng.normal(size=count), -1.5, 1.5)
+    at = np.round(1e9 * np.arange(count) / rate)
+    found = diagnose((Samples.of(at[::4], np.outer(motion[::4], [1, 0, 0])),
+                      Samples.of(at, np.outer(sensor, [1, 0, 0]))), SensorModel(Gain(1.0)),
+                     time_limit_s=10)
+    words = found.as_dict()["integrity"]
+    assert sum("upper limit" in one for one in words) == 1
+    assert sum("lower limit" in one for one in words) == 1

@@ -39,7 +39,7 @@ def clipped_sensor(reference, sensor, valid, step, sampling_rate_hz, lag_s):
     return clipped(sensor, valid, step, model)
 
 
-def clipped_before_resampling(record, column, used):
+def clipped_before_resampling(record, column, used, known):
     """Clipped samples of a sensor that was resampled: of its topic's, by a classical sensor
     identified without them from a slower reference. What is faster is noise there.
 
@@ -49,6 +49,8 @@ def clipped_before_resampling(record, column, used):
     column : int
     used : ndarray of bool, shape (n,)
         Which of the record's instants count.
+    known : tuple of float or None
+        Limits that are certain by themselves: nothing is asked of what lies there.
 
     Returns
     -------
@@ -58,10 +60,11 @@ def clipped_before_resampling(record, column, used):
     values = topic.values[:, column]
     place = record.place(topic.clock.instants_s(topic.stamps_ns))
     slot = np.clip(np.round(place).astype(int), 0, len(record) - 1)
-    valid = used[slot] & (np.abs(place - slot) < 1)
+    certain = np.any([values == limit for limit in known], axis=0)
+    valid = used[slot] & (np.abs(place - slot) < 1) & ~certain
 
     def model(others):
-        taken = values[valid & ~others]
+        taken = values[valid & ~others | certain]
         free = used & ~record.instants_of(lambda own: np.isin(own, taken), column)
         seen, structure = record.comparable(column, free), OscillatorStructure()
         reference = seen.reference[:, column]

@@ -94,7 +94,7 @@ class InterferenceBursts(Effect):
         starts = np.flatnonzero(np.diff(np.r_[0, inside.astype(int)]) == 1)
         mostly = share * (loud - noise) > _MOSTLY * np.mean(error**2)
         if len(starts) < (_FEWEST if mostly else _SEVERAL) or _going_on(error, noise) < _GOES_ON \
-                or _follows(inside, error, output, len(starts)) \
+                or _follows(inside, error, output, starts) \
                 or _one_sided(error, inside) \
                 or not _RINGS < _smooth(error, inside) < _SETTLES \
                 or _grows(error, output) > _AS_GOOD * better:
@@ -187,13 +187,14 @@ def _going_on(error, quiet):
     return out[1:][out[:-1]].mean() if out[:-1].any() else 0.0
 
 
-def _follows(inside, error, output, count):
+def _follows(inside, error, output, starts):
     """Whether the bursts or the error in them have to do with the motion."""
     from scipy.stats import rankdata
     slope = np.gradient(output)
     bend = np.gradient(slope)
-    if _struck(inside, output, slope):
+    if _struck(starts, output, slope):
         return True
+    count = len(starts)
     # as many stretches as long as a burst could be one, and as many in them are independent
     stretches, samples = count / inside.mean(), max(inside.sum() / _WINDOW, count)
     moving = output - output.mean()
@@ -210,12 +211,11 @@ def _follows(inside, error, output, count):
     return False
 
 
-def _struck(inside, output, slope):
+def _struck(starts, output, slope):
     """Whether bursts begin where the motion comes to a certain place or size, or nearly all of them
     on the way out or back, as where a loose part strikes. Of such as only begin there more often,
     an error that grows with the motion may be behind it."""
     from scipy.stats import binomtest, iqr, rankdata
-    starts = np.flatnonzero(np.diff(np.r_[0, inside.astype(int)]) == 1)
     moving = output - np.median(output)
     outward = int(np.sum(moving[starts] * slope[starts] > 0))
     if abs(outward / len(starts) - 0.5) > _ONE_WAY and binomtest(

@@ -90,7 +90,8 @@ class ReferenceSmoothing(Effect):
         coarse = [cls(float(length), order) for length in np.geomspace(0.3, 100, 80) / view.rate
                   for order in (1, 2, 4, 16)]
         # a core that was identified may have its resonance where the motion is lost
-        cores = [None] if beyond_band(view) is None else [None, beyond_band(view)]
+        far = beyond_band(view)
+        cores = [None] if far is None else [None, far]
         near = [matching(view, coarse, core=core, lost=True, response=_of_motion)
                 for core in cores]
         # a notch in the wrong place turns the sign of what is beside it: no fit comes from afar
